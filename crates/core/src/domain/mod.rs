@@ -91,7 +91,7 @@ pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
 pub use sanitize::{first_names, is_hidden, one_line, sanitize, value_text, visible, visible_json};
 pub use seeded_random::SeededRandom;
-pub use separator_line::{SeparatorLines, named_separator, separator_line};
+pub use separator_line::{SeparatorLines, named_separator};
 pub use significant::{fixed, significant};
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};

@@ -1,19 +1,11 @@
-//! The first line of a table, such as `sep=;`, that names the separator of columns for Excel.
+//! A line at the beginning of a table, such as `sep=;`, that names the separator of columns for Excel.
 
 /// Longest such line with blanks.
 const MAX_LINE_BYTES: usize = 32;
-
-/// Returns the separator that the first line of a list names, and the number of bytes before the line break.
-pub fn separator_line(list: &[u8]) -> Option<(u8, usize)> {
-    let head = &list[..list.len().min(MAX_LINE_BYTES)];
-    let end = head.iter().position(|byte| b"\r\n".contains(byte))?;
-    Some((named_separator(&head[..end])?, end))
-}
-
 /// Most lines, with blank ones, among which the separator is named.
 const MAX_LINES: usize = 16;
 
-/// The first lines of a list that name its separator, of which there may be several, with blank lines before and between them.
+/// The lines at the beginning of a list that name its separator. There may be several, with blank lines before and between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SeparatorLines {
     /// The separator that the last one names.
@@ -36,34 +28,33 @@ impl SeparatorLines {
     pub fn find(list: &[u8]) -> Option<Self> {
         let (mut found, mut breaks, mut at) = (None, Vec::new(), 0);
         for _ in 0..MAX_LINES {
-            let rest = &list[at..];
-            let named = separator_line(rest);
-            let line = named.map(|(_, end)| end).or_else(|| blank_line(rest));
-            let Some(line) = line else {
+            let Some(line) = first_line(&list[at..]) else {
                 break;
             };
-            let end = at + line;
-            if let Some((separator, _)) = named {
+            let end = at + line.len();
+            if let Some(separator) = named_separator(line) {
                 let breaks = breaks.clone();
                 found = Some(Self {
                     separator,
                     breaks,
                     end,
                 });
+            } else if !line.trim_ascii().is_empty() {
+                break;
             }
-            let is_pair = list[end..].starts_with(b"\r\n");
-            at = end + if is_pair { 2 } else { 1 };
+            let is_crlf = list[end..].starts_with(b"\r\n");
+            at = end + if is_crlf { 2 } else { 1 };
             breaks.extend_from_slice(&list[end..at]);
         }
         found
     }
 }
 
-/// Returns the number of bytes before the line break of a first line that is blank.
-fn blank_line(list: &[u8]) -> Option<usize> {
+/// Returns the first line without its line break. `None` if it is too long to name a separator, or has no line break.
+fn first_line(list: &[u8]) -> Option<&[u8]> {
     let head = &list[..list.len().min(MAX_LINE_BYTES)];
     let end = head.iter().position(|byte| b"\r\n".contains(byte))?;
-    head[..end].trim_ascii().is_empty().then_some(end)
+    Some(&head[..end])
 }
 
 /// Returns the separator that a line without its line break names. Blanks and case do not matter. The line may be in quotation
@@ -105,7 +96,7 @@ fn without_blanks(mut text: &[u8]) -> &[u8] {
 
 #[cfg(test)]
 mod tests {
-    use super::separator_line;
+    use super::SeparatorLines;
 
     #[test]
     fn blanks_quotes_and_case_do_not_matter() {
@@ -129,7 +120,9 @@ mod tests {
             ("id,mesh,print\n", None),
             ("", None),
         ] {
-            assert_eq!(separator_line(list.as_bytes()), expected, "{list:?}");
+            let found = SeparatorLines::find(list.as_bytes());
+            let found = found.map(|lines| (lines.separator, lines.end));
+            assert_eq!(found, expected, "{list:?}");
         }
     }
 }
