@@ -22,7 +22,7 @@ pub(super) fn check_header(line: u64, content: &[u8]) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// Refuses lines without a title if points do not have so many columns.
+/// Refuses lines without a title that have more columns than points have.
 ///
 /// # Errors
 /// Returns an error that names the first line.
