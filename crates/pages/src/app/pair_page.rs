@@ -62,7 +62,8 @@ pub(super) async fn page(
         let title = one_line(name.as_str());
         return Ok(frame(&visit, &title, Some(&key), NavSection::Pairs, &body));
     }
-    if open.catalog.pair(&name).await?.is_none() {
+    let unknown = open.catalog.unknown_names(std::slice::from_ref(&name));
+    if !unknown.await?.is_empty() {
         return Err(no_pair(&pair));
     }
     let found = details::read(&pair, &open.catalog, &open.location()).await?;

@@ -59,17 +59,16 @@ async fn outdated_names(
     options: &RunOptions,
     blocks: &[BlockState],
 ) -> ProjectResult<BTreeSet<BlockName>> {
-    if blocks.is_empty() {
-        return Ok(BTreeSet::new());
-    }
-    let planned = planned_blocks(catalog, options).await?;
-    let mut planned: BTreeSet<BlockName> = planned.into_iter().map(|entry| entry.block).collect();
     let settled = blocks
         .iter()
         .filter(|state| matches!(state.status, JobStatus::Done | JobStatus::Quarantined));
     let settled: BTreeSet<&BlockName> = settled.map(|state| &state.attributes.name).collect();
-    planned.retain(|name| settled.contains(name));
-    Ok(planned)
+    if settled.is_empty() {
+        return Ok(BTreeSet::new());
+    }
+    let planned = planned_blocks(catalog, options).await?;
+    let names = planned.into_iter().map(|entry| entry.block);
+    Ok(names.filter(|name| settled.contains(name)).collect())
 }
 
 /// Returns the finished or failed blocks that were changed since their last run, as far as the catalog knows.
