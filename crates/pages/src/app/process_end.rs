@@ -96,34 +96,32 @@ pub(super) fn reason_of_end(status: ExitStatus, messages: &str) -> Option<[Strin
 
 /// Returns what a signal that ended a process means.
 fn reason_of_signal(signal: i32, messages: &str) -> [String; 2] {
-    let mut reasons = REASONS.iter();
     let known = if messages.contains(NO_MEMORY_MESSAGE) {
         Some(&OUT_OF_MEMORY)
     } else {
+        let mut reasons = REASONS.iter();
         reasons.find(|reason| reason.signals.contains(&signal))
     };
-    let [english, vietnamese] = texts(known);
-    [
-        format!("{} (signal {signal}){}", english.0, english.1),
-        format!("{} (tín hiệu {signal}){}", vietnamese.0, vietnamese.1),
-    ]
+    explained(
+        known,
+        &[format!("signal {signal}"), format!("tín hiệu {signal}")],
+    )
 }
 
 /// Returns what a code by which Windows ended a process means.
 fn reason_of_code(code: u32) -> [String; 2] {
     let known = REASONS.iter().find(|reason| reason.codes.contains(&code));
-    let [english, vietnamese] = texts(known);
-    [
-        format!("{} (code 0x{code:08X}){}", english.0, english.1),
-        format!("{} (mã 0x{code:08X}){}", vietnamese.0, vietnamese.1),
-    ]
+    explained(
+        known,
+        &[format!("code 0x{code:08X}"), format!("mã 0x{code:08X}")],
+    )
 }
 
-/// Returns the texts of a reason, and what may be behind it, in both languages. A reason that is not known is a crash.
-fn texts(known: Option<&EndReason>) -> [(&'static str, &'static str); 2] {
-    let [english, vietnamese] = known.map_or(CRASHED, |reason| reason.texts);
-    let [perhaps, there] = known.map_or(NONE, |reason| reason.perhaps);
-    [(english, perhaps), (vietnamese, there)]
+/// Returns a reason with the signal or code that shows it, in both languages. A reason that is not known is a crash.
+fn explained(known: Option<&EndReason>, shown_by: &[String; 2]) -> [String; 2] {
+    let texts = known.map_or(CRASHED, |reason| reason.texts);
+    let perhaps = known.map_or(NONE, |reason| reason.perhaps);
+    [0, 1].map(|i| format!("{} ({}){}", texts[i], shown_by[i], perhaps[i]))
 }
 
 #[cfg(test)]
