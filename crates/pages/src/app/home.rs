@@ -169,8 +169,7 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
 }
 
 fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
-    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
-    let (done, failed) = (jobs(JobStatus::Done), jobs(JobStatus::Quarantined));
+    let [done, failed] = [JobStatus::Done, JobStatus::Quarantined].map(|one| jobs(counts, one));
     let judged: u64 = counts.verdicts.values().sum();
     html! {
         p {
@@ -200,15 +199,17 @@ fn waiting_part(visit: &Visit, base: &str, found: &ProjectState) -> Markup {
 
 /// Returns the number of pairs that wait, run or back off. Without a run, leases are those of an interrupted one.
 fn outstanding(counts: &StatusCounts) -> u64 {
-    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
-    let open = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased].map(jobs);
-    open.iter().sum()
+    let open = [JobStatus::Ready, JobStatus::Backoff, JobStatus::Leased];
+    open.iter().map(|status| jobs(counts, *status)).sum()
+}
+
+fn jobs(counts: &StatusCounts, status: JobStatus) -> u64 {
+    counts.jobs.get(&status).copied().unwrap_or(0)
 }
 
 /// Names what a project needs next.
 fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
     let counts = &found.counts;
-    let jobs = |status| counts.jobs.get(&status).copied().unwrap_or(0);
     if found.is_running {
         visit.t("Watch the run", "Xem tiến trình")
     } else if outstanding(counts) + counts.stale > 0 {
@@ -217,7 +218,7 @@ fn next_step(visit: &Visit, found: &ProjectState) -> &'static str {
         visit.t("Align the blocks", "Căn chỉnh các ván")
     } else if found.other_files > 0 {
         visit.t("Look for changed files", "Tìm tệp đã đổi")
-    } else if jobs(JobStatus::Quarantined) + found.failed_blocks > 0 {
+    } else if jobs(counts, JobStatus::Quarantined) + found.failed_blocks > 0 {
         visit.t("See what failed", "Xem các mục lỗi")
     } else {
         visit.t("Open", "Mở")

@@ -1,6 +1,6 @@
 //! Marks around counts in sentences, so that a count is found again when the sentence is translated.
 //!
-//! The marks are characters for private use, which no text has.
+//! The marks are characters for private use. A text that has such characters loses them.
 
 /// The character before the first count of a text. Those of the others follow it.
 const FIRST_BEGIN: char = '\u{f0000}';

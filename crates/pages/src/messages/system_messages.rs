@@ -233,7 +233,7 @@ fn row(words: &str) -> Option<&'static str> {
 pub(super) fn with_known_reasons(text: &str) -> String {
     const START: &str = " (os error ";
     let mut known = text.to_owned();
-    // What stands before a place stays as it is until then.
+    // From the end, so that the places before a replaced one stay right.
     for (at, start) in text.rmatch_indices(START) {
         let number = text[at + start.len()..].split(')').next();
         let Some(number) = number.and_then(|number| number.parse::<i32>().ok()) else {
