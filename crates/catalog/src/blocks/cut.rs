@@ -19,6 +19,7 @@ use crate::queue::pair_job::PairJob;
 use crate::queue::provenance::InputVersions;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::records::similar_names;
+use crate::records::status::in_force;
 use mocban_core::domain::{BlockId, BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
@@ -60,11 +61,14 @@ const PAIRS: &str = "
 SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id";
 
 /// Counts the pairs among `?1` that have a job and a verdict that nobody has undone or set apart.
-const JUDGED: &str = "
+const JUDGED: &str = concat!(
+    "
 SELECT count(*) FROM job AS j WHERE j.pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) AND EXISTS (
     SELECT 1 FROM verdict AS v WHERE v.pair = j.pair
-        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
-        AND v.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))";
+        AND ",
+    in_force!("v"),
+    ")"
+);
 
 /// The columns of a pair whose change does not affect its results.
 const WITHOUT_EFFECT: [&str; 3] = ["character", "block", "metadata"];

@@ -60,7 +60,7 @@ macro_rules! standing_of_verdicts {
             WHEN count(CASE WHEN v.verdict = 'pass' THEN 1 END) = 0 THEN
                 CASE WHEN count(CASE WHEN v.verdict = 'fail' THEN 1 END) = 0 THEN 4 ELSE 2 END
             WHEN count(CASE WHEN v.verdict = 'fail' THEN 1 END) = 0 THEN 1 ELSE 3 END ",
-            from_current_verdicts!(),
+            $crate::records::status::from_current_verdicts!(),
             " AND v.pair = c.id AND v.metric = ?5"
         )
     };
@@ -69,9 +69,11 @@ macro_rules! standing_of_verdicts {
 /// Selects verdicts on earlier results of the pair `c` and the metric `?5`, whose current result is `m`.
 macro_rules! earlier_verdicts {
     () => {
-        "SELECT 1 FROM verdict AS e WHERE e.pair = c.id AND e.metric = ?5 AND e.result_hash <> m.result_hash
-            AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = e.act)
-            AND e.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2)"
+        concat!(
+            "SELECT 1 FROM verdict AS e WHERE e.pair = c.id AND e.metric = ?5 AND e.result_hash <> m.result_hash
+        AND ",
+            $crate::records::status::in_force!("e")
+        )
     };
 }
 pub(super) use {earlier_verdicts, standing_of_verdicts};

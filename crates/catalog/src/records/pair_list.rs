@@ -9,7 +9,7 @@ use crate::db::row::from_row;
 use crate::records::joint_verdict::{JointVerdict, earlier_verdicts, standing_of_verdicts};
 use crate::records::model::PairResults;
 use crate::records::reviewer_names::Spellings;
-use crate::records::status::{from_current_verdicts, person};
+use crate::records::status::from_current_verdicts;
 use crate::{Catalog, Result};
 use mocban_core::domain::{FailureClass, JobStatus, ThresholdMetric, Verdict, enum_names};
 

@@ -26,30 +26,56 @@ macro_rules! person {
     };
 }
 
+/// Returns the condition that nobody has undone a verdict or set it apart.
+macro_rules! in_force {
+    ($verdict:literal) => {
+        concat!(
+            "NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = ",
+            $verdict,
+            ".act)
+        AND ",
+            $verdict,
+            ".id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2)"
+        )
+    };
+}
+
+/// Returns the condition that a verdict `v` is the newest one in force of its reviewer on a metric of a pair, among the
+/// verdicts `n` with a further condition. `?1` has the stored spellings of names that are not the spelling of the name.
+macro_rules! newest_verdict {
+    ($condition:literal) => {
+        concat!(
+            "v.id = (
+    SELECT max(n.id) FROM verdict AS n
+    WHERE n.pair = v.pair AND n.metric = v.metric AND ",
+            $crate::records::status::person!("n"),
+            " = ",
+            $crate::records::status::person!("v"),
+            $condition,
+            "
+        AND ",
+            $crate::records::status::in_force!("n"),
+            ")"
+        )
+    };
+}
+
 /// Selects verdicts `v` on current results of pairs that are done, as a report counts them. Only the newest verdict of each
 /// reviewer on a result counts. Leaves out the verdicts that the owner has set apart; damaged ones that nobody knows of yet are
-/// found by a check or a report.
-///
-/// `?1` has the stored spellings of names that are not the spelling of the name.
+/// found by a check or a report. `?1` is as in `newest_verdict`.
 macro_rules! from_current_verdicts {
     () => {
         concat!(
             "FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
-WHERE v.id = (
-    SELECT max(n.id) FROM verdict AS n
-    WHERE n.pair = v.pair AND n.metric = v.metric AND ",
-            person!("n"),
-            " = ",
-            person!("v"),
-            " AND n.result_hash = v.result_hash
-        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
-        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
+WHERE ",
+            $crate::records::status::newest_verdict!(" AND n.result_hash = v.result_hash"),
+            "
     AND EXISTS (SELECT 1 FROM job AS done WHERE done.pair = v.pair AND done.status = 3)"
         )
     };
 }
-pub(crate) use {from_current_verdicts, person};
+pub(crate) use {from_current_verdicts, in_force, newest_verdict, person};
 
 /// Counts verdicts on current results.
 const VERDICTS: &str = concat!(
@@ -61,19 +87,12 @@ GROUP BY v.verdict"
 );
 
 /// Counts verdicts on pairs that wait or run, whose results are not known yet. Only the newest verdict of each reviewer on a metric
-/// counts. `?1` is as in `from_current_verdicts`.
+/// counts.
 const WAITING_VERDICTS: &str = concat!(
     "
 SELECT count(*) FROM job AS j JOIN verdict AS v ON v.pair = j.pair
-WHERE j.status < 3 AND v.id = (
-    SELECT max(n.id) FROM verdict AS n
-    WHERE n.pair = v.pair AND n.metric = v.metric AND ",
-    person!("n"),
-    " = ",
-    person!("v"),
-    "
-        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
-        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))"
+WHERE j.status < 3 AND ",
+    newest_verdict!("")
 );
 
 /// Completed pairs whose result of the default metric has a low confidence.
