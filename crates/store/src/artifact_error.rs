@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::input_error::InputError;
 use super::open_file::file_kind;
 use super::remote::BucketError;
-use mocban_core::domain::Explained;
+use mocban_core::domain::{Explained, moved_away};
 
 /// Why an artifact could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +28,7 @@ pub enum ArtifactError {
         wanted: &'static str,
     },
     /// The project's directory was renamed or removed.
-    #[error(
-        "{0} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path"
-    )]
+    #[error("{}", moved_away(.0))]
     Moved(PathBuf),
     /// A row names a pack in an object store, but the settings name no store.
     #[error("artifact {0} is in an object store; set storage.artifacts to its address")]

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::error::{CatalogError, LogLoss};
 use super::error_kind::CatalogErrorKind;
 use super::lock_owner::{LockOwner, lock_owner};
-use mocban_core::domain::{CATALOG_FILE, ErrorCode, Explained, FREE_SPACE};
+use mocban_core::domain::{CATALOG_FILE, ErrorCode, Explained, FREE_SPACE, moved_away};
 use mocban_system::platform;
 use mocban_system::time_text::local;
 
@@ -105,10 +105,7 @@ impl CatalogError {
             Some(CatalogErrorKind::ReadOnly)
                 if matches!(project.join(CATALOG_FILE).try_exists(), Ok(false)) =>
             {
-                format!(
-                    "{} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path",
-                    project.display()
-                )
+                moved_away(project)
             }
             Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
                 Self::NotWritable(path.into()).to_string()

@@ -63,6 +63,14 @@ enum_names! {
 /// What to do when a disk is full.
 pub const FREE_SPACE: &str = "free some space and try again, everything stored so far is safe";
 
+/// Returns the message of a command whose project in a folder was renamed, moved or removed meanwhile.
+pub fn moved_away(project: &Path) -> String {
+    format!(
+        "{} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path",
+        project.display()
+    )
+}
+
 /// An error that knows what it means for its user. An error that only wraps another one has its code and advice.
 pub trait Explained: Error + Send + Sync + 'static {
     /// Returns the error that this one wraps.

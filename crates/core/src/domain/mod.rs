@@ -67,7 +67,7 @@ pub use control_points::{ControlPoint, ControlPoints};
 pub use displaced_part::DisplacedPart;
 pub use enum_names::enum_names;
 use enum_names::stage_order;
-pub use explained::{ErrorCode, Explained, FREE_SPACE, explained_by_cause};
+pub use explained::{ErrorCode, Explained, FREE_SPACE, explained_by_cause, moved_away};
 pub use failure::{Failure, FailureClass, NOT_THERE, UNIT_CLAUSES};
 pub use file_kind::{FileKind, pointer_of};
 pub use hash::{ContentHash, ContentHashError};
