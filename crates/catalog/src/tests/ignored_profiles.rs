@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
+use super::World;
 use super::blocks::{continued, done};
-use super::{World, name};
 use crate::{IgnoredProfiles, ProfileCount, StageCheckpoint};
 use mocban_core::domain::{BlockStage, Stage};
 
@@ -28,8 +28,7 @@ async fn prints_with_an_ignored_profile_are_counted_while_their_pairs_are() {
         world.finish_with(set_outcome).await;
     }
     assert_eq!(profiles().await.pairs, Some(count("p1", 2)));
-    let retired = world.catalog.retire_pairs(&[name("p1")], 3).await;
-    retired.expect("retired");
+    world.retire("p1", 3).await;
     let found = profiles().await;
     assert_eq!(found.pairs, Some(count("p2", 1)));
     let sentence = "prints with a colour profile that cannot be applied: 1, first of p2; `show` names the profile";

@@ -357,12 +357,7 @@ async fn new_pairs_and_blocks_with_the_files_of_earlier_ones_are_counted() {
     let rows = vec![again("a", "p1"), row("r"), again("b", "q")];
     assert_eq!(import(rows).await, same("a", "p1", 2));
     // What is in no count is not counted twice.
-    let retired = [name("p0")];
-    world
-        .catalog
-        .retire_pairs(&retired, 3)
-        .await
-        .expect("retired");
+    world.retire("p0", 3).await;
     assert_eq!(import(vec![again("c", "p0")]).await, None);
     let blocks = super::blocks::world().await;
     let again = BlockAttributes {
@@ -407,8 +402,7 @@ async fn pairs_and_blocks_with_the_contents_of_earlier_ones_are_counted_after_th
     };
     assert_eq!(same().await.pairs, found("p4", 2));
     // A copy that is in no count is no longer counted.
-    let retired = world.catalog.retire_pairs(&[name("p4")], 3).await;
-    retired.expect("retired");
+    world.retire("p4", 3).await;
     assert_eq!(same().await.pairs, found("p5", 1));
 
     let blocks = super::blocks::world().await;
@@ -435,7 +429,6 @@ async fn pairs_and_blocks_with_the_contents_of_earlier_ones_are_counted_after_th
         );
     }
     assert_eq!(same().await.sentences(), [sentence]);
-    let retired = blocks.catalog.retire_pairs(&[name("c_x")], 3).await;
-    assert_eq!(retired.expect("retired"), 1);
+    blocks.retire("c_x", 3).await;
     assert_eq!(same().await, SameContents::default());
 }

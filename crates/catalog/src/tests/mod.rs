@@ -172,6 +172,12 @@ impl World {
         retried.map(|[pairs, _]| pairs)
     }
 
+    /// Retires a pair that is not retired yet.
+    async fn retire(&self, pair: &str, at: UnixMillis) {
+        let retired = self.catalog.retire_pairs(&[name(pair)], at).await;
+        assert_eq!(retired.expect("retired"), 1);
+    }
+
     /// Asserts that a plan for all pairs, made from counters, equals a plan that inspects each named pair. Asserts the
     /// same of the number of stale pairs.
     async fn assert_plans_agree(&self) {

@@ -118,14 +118,9 @@ async fn filters_hold_together_in_every_order() {
 #[tokio::test]
 async fn retired_pairs_are_in_no_list_and_verdicts_are_found() {
     let world = world(8, 8).await;
-    let [retired, pair] = ["p002", "p004"].map(name);
-    world
-        .catalog
-        .retire_pairs(&[retired], 9)
-        .await
-        .expect("retired");
+    world.retire("p002", 9).await;
     let given = NewVerdict {
-        pair,
+        pair: name("p004"),
         metric: Some(ThresholdMetric::Ensemble),
         ..super::verdicts::verdict("ana", Verdict::Fail)
     };
@@ -247,15 +242,12 @@ async fn a_joint_verdict_is_stale_if_only_an_earlier_result_was_judged() {
         joint: Some(JointVerdict::Stale),
         ..PairFilter::default()
     };
-    assert!(
-        listed(&world, &stale, PairOrder::Imported, 2)
-            .await
-            .is_empty()
-    );
+    let found = async |size| listed(&world, &stale, PairOrder::Imported, size).await;
+    assert!(found(2).await.is_empty());
     let (current, again) = (fingerprints([1; 4]), RerunPolicy::All(Stage::Register));
     let requeued = world.catalog.requeue_stale(&current, None, again).await;
     assert_eq!(requeued.expect("requeued"), 3);
-    let running = listed(&world, &stale, PairOrder::Imported, 2).await;
+    let running = found(2).await;
     assert!(running.is_empty(), "they have no results: {running:?}");
     for n in 0..3 {
         let change = |done: &mut StageCheckpoint| {
@@ -267,10 +259,10 @@ async fn a_joint_verdict_is_stale_if_only_an_earlier_result_was_judged() {
         world.finish_with(change).await;
     }
     judge("p001").await;
-    assert_eq!(listed(&world, &stale, PairOrder::Imported, 2).await, [0]);
+    assert_eq!(found(2).await, [0]);
     let undone = world.catalog.verdict_undo(Some("ana"), 10).await;
     undone.expect("undone");
-    assert_eq!(listed(&world, &stale, PairOrder::Imported, 1).await, [0, 1]);
+    assert_eq!(found(1).await, [0, 1]);
 }
 
 #[tokio::test]
@@ -305,8 +297,7 @@ async fn the_least_confident_results_since_a_time_come_first() {
         assert_eq!(least(100, metric).await, ["p005", "p004", "p006"]);
     }
     assert!(least(101, ThresholdMetric::Ensemble).await.is_empty());
-    let retired = world.catalog.retire_pairs(&[name("p005")], 9).await;
-    retired.expect("retired");
+    world.retire("p005", 9).await;
     let left = least(100, ThresholdMetric::Ensemble).await;
     assert_eq!(left, ["p004", "p006", "p003"]);
     let (current, all) = (fingerprints([1; 4]), RerunPolicy::All(Stage::Fit));

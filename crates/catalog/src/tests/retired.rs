@@ -51,12 +51,7 @@ async fn verdicts_wait_for_the_results_of_their_pairs() {
         .requeue_stale(&other, None, RerunPolicy::Changed);
     assert!(requeued.await.expect("requeued") > 0);
     assert_eq!(waiting().await, 1);
-    let names = [name("p0")];
-    world
-        .catalog
-        .retire_pairs(&names, 9)
-        .await
-        .expect("retired");
+    world.retire("p0", 9).await;
     assert_eq!(waiting().await, 0, "a retired pair is in no count");
 }
 
@@ -118,11 +113,7 @@ async fn a_retired_pair_is_in_no_count_and_comes_back_with_all_it_had() {
 async fn the_lease_of_a_retired_pair_ends() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.pop().expect("a ready pair");
-    world
-        .catalog
-        .retire_pairs(&[name("p0")], 9)
-        .await
-        .expect("retired");
+    world.retire("p0", 9).await;
     assert!(world.claim(1).await.is_empty());
     let stored = world
         .catalog
@@ -143,11 +134,7 @@ async fn the_lease_of_a_retired_pair_ends() {
 #[tokio::test]
 async fn a_list_that_replaces_the_others_retires_pairs_until_a_list_has_them_again() {
     let world = World::new(3).await;
-    world
-        .catalog
-        .retire_pairs(&[name("p2")], 5)
-        .await
-        .expect("retired");
+    world.retire("p2", 5).await;
     let shorter = replace(&world, &["p0", "p3"]).await;
     assert_eq!(
         (shorter.added, shorter.retired, shorter.restored),
@@ -203,11 +190,8 @@ async fn pairs_of_blocks_are_retired_by_people_and_not_by_lists() {
         .await;
     let shorter = replace(&world, &["q0"]).await;
     assert_eq!((shorter.added, shorter.retired), (1, 0));
+    world.retire("b_a", 9).await;
     let catalog = &world.catalog;
-    catalog
-        .retire_pairs(&[name("b_a")], 9)
-        .await
-        .expect("retired");
     let state = async || {
         let detail = catalog.block(&block("b")).await.expect("a read");
         let state = detail.expect("the block").state;
@@ -252,8 +236,7 @@ async fn pairs_of_blocks_are_retired_by_people_and_not_by_lists() {
 #[tokio::test]
 async fn an_import_counts_the_listed_pairs_that_a_person_retired() {
     let world = World::new(2).await;
-    let retired = world.catalog.retire_pairs(&[name("p0")], 9).await;
-    assert_eq!(retired.expect("retired"), 1);
+    world.retire("p0", 9).await;
     let summary = replace(&world, &["p0", "p1"]).await;
     assert_eq!((summary.restored, summary.still_retired), (0, 1));
 }

@@ -138,8 +138,7 @@ async fn retired_pairs_and_pairs_of_blocks_are_not_corrected() {
     let imported = world.catalog.import(vec![row("p0")], 1).await;
     assert_eq!(imported.expect("imported").added, 1);
     let names = [name("b_c01-r01"), name("p0")];
-    let stored = world.catalog.retire_pairs(&names[1..], 7).await;
-    assert_eq!(stored.expect("retired"), 1);
+    world.retire("p0", 7).await;
     let cm = ScanCorrection::Unit(Some(LengthUnit::Cm));
     assert_eq!(correct(&world, &names, cm).await, 0);
     assert_eq!(attributes_of(&world, &names[0]).await.unit, None);
