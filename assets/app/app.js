@@ -19,7 +19,7 @@ function keptName(form) {
   return form.closest("[data-chosen]")?.dataset.chosen;
 }
 
-/** Adds fields to an address. */
+/** Sets the values of fields in an address. Empty ones are removed from it. */
 function addFields(address, fields) {
   for (const field of fields) {
     const value = field.type === "checkbox" && !field.checked ? "" : field.value;
@@ -37,7 +37,8 @@ function keepInAddress(form) {
   history.replaceState(null, "", here);
 }
 
-// Links to the same page, such as those to other folders, keep what was typed. What was confirmed holds for these files only.
+// Links to the same page, such as those to other folders, keep what was typed. A confirmation in a checkbox is not kept: it is
+// about the files that are shown.
 document.addEventListener("click", (event) => {
   const link = event.target.closest("a[href]");
   const typed = document.querySelectorAll("[data-in-address]:not([type=checkbox])");

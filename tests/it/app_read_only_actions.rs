@@ -124,7 +124,7 @@ impl ReadOnlyFolder {
         html(&self.page, "/?language=en");
     }
 
-    /// Sends every action on [`varied_project`], with what [`write_list`] has written.
+    /// Sends every action on [`project_with_list`].
     fn refuses_all_actions(&self) {
         let project = self.dir.join("p");
         let review = |invite: &str| {
@@ -206,21 +206,24 @@ fn view(action: &str, view: &str, name: &str) -> Value {
     json!({"action": action, "view": view, "name": name, "list": "state=failed"})
 }
 
-#[test]
-fn no_action_changes_a_project_that_cannot_be_written() {
+/// Makes a [`varied_project`] with a list, which [`ReadOnlyFolder::refuses_all_actions`] imports.
+fn project_with_list() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("a temporary directory");
     varied_project(&dir);
     let project = dir.path().canonicalize().expect("a path").join("p");
     write_list(&project);
+    dir
+}
+
+#[test]
+fn no_action_changes_a_project_that_cannot_be_written() {
+    let dir = project_with_list();
     ReadOnlyFolder::open(dir.path()).refuses_all_actions();
 }
 
 #[test]
 fn a_project_on_a_read_only_disk_is_shown_and_stays_as_it_is() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    varied_project(&dir);
-    let project = dir.path().canonicalize().expect("a path").join("p");
-    write_list(&project);
+    let dir = project_with_list();
     let Some(folder) = ReadOnlyFolder::mounted(dir.path()) else {
         return;
     };

@@ -34,7 +34,8 @@ pub fn app_pages(options: AppOptions) -> Router {
         .route(&format!("{action}/retire"), post(run_actions::retire))
         .route(&format!("{action}/correct"), post(scan_correction::correct))
         .route(&format!("{action}/review"), post(review_page::start))
-        // Guards the actions above, which change a project. Others write files, or may change nothing: they look by themselves.
+        // Guards the actions above, which change a project. Others only write files, or may change nothing, and check it
+        // themselves.
         .route_layer(guard)
         .route("/", get(home::page))
         .route("/assets/{name}", get(assets::asset))

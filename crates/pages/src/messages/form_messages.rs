@@ -72,7 +72,7 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "remove them if they are not meant",
         "hãy xóa các dòng đó nếu không cần",
     ),
-    // Files that were not fetched.
+    // Files that a list names and no run can use.
     (
         "pairs with one file as mesh and print: {}, the first {} on line {}",
         "số cặp dùng một tệp cho cả bản quét và bản in: {0#}, cặp đầu tiên là {1}, ở dòng {2}",
