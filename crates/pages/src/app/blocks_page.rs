@@ -10,6 +10,7 @@ use maud::{Markup, html};
 use super::address::encoded;
 use super::components::{NavSection, empty, figure, frame, grouped, stored_message};
 use super::failure::AppResult;
+use super::remedies::import_address;
 use super::run_blocks::{changed_names, changed_part};
 use super::state::AppState;
 use super::visit::Visit;
@@ -73,7 +74,7 @@ fn none(visit: &Visit, key: &str) -> Markup {
         "This project has no whole blocks. A list of blocks names a scan and a page for each; a run then finds the characters.",
         "Dự án này không có ván nguyên. Danh sách ván nêu bản quét và trang in của từng ván; lần chạy sẽ tìm các chữ.",
     );
-    let import = format!("{}import?project={}", visit.root, encoded(key));
+    let import = import_address(visit, key, None);
     empty(
         text,
         &html! {

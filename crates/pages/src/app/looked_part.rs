@@ -2,8 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::address::encoded;
 use super::components::grouped;
+use super::remedies::import_address;
 use super::visit::Visit;
 use mocban_core::domain::one_line;
 use mocban_project::input_places::InputPlaces;
@@ -46,7 +46,7 @@ pub(super) fn looked_part(
                     (visit.t("Put them back, or import them again from where they are now.", "Hãy đưa chúng về chỗ cũ, hoặc nhập lại từ chỗ hiện có tệp."))
                     @if !places.is_of_all() { " " (looked_at) "." }
                 }
-                p.row { a href={ (visit.root) "import?project=" (encoded(key)) } { (visit.t("Import", "Nhập dữ liệu")) } }
+                p.row { a href=(import_address(visit, key, None)) { (visit.t("Import", "Nhập dữ liệu")) } }
             }
         }
         @if is_unchanged {
