@@ -1,16 +1,17 @@
-//! What ended a process that could not end by itself, in English and Vietnamese.
+//! What ended a process that did not exit by itself, in English and Vietnamese.
 
 use std::process::ExitStatus;
 
 use mocban_system::platform;
 
-/// How a process can be ended, in English and Vietnamese.
+/// A reason why a process did not exit by itself.
 #[derive(Debug)]
 struct EndReason {
     /// Signals with the same numbers on Linux and macOS.
     signals: &'static [i32],
     /// Codes that Windows gives to processes that it ends (`NTSTATUS`).
     codes: &'static [u32],
+    /// In English and Vietnamese.
     texts: [&'static str; 2],
     /// What may be behind it.
     perhaps: [&'static str; 2],
@@ -83,7 +84,7 @@ const CRASHED: [&str; 2] = ["it crashed", "chương trình gặp sự cố"];
 /// What the standard library writes before it ends a program that got no memory.
 const NO_MEMORY_MESSAGE: &str = "memory allocation of ";
 
-/// Returns what ended a process with these messages, in English and Vietnamese. `None` if it ended by itself, with a code that
+/// Returns what ended a process with these messages, in English and Vietnamese. `None` if it exited by itself, with a code that
 /// its messages explain.
 pub(super) fn reason_of_end(status: ExitStatus, messages: &str) -> Option<[String; 2]> {
     match (status.code(), platform::ending_signal(status)) {
