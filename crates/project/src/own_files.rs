@@ -6,7 +6,7 @@ use crate::empty_import::EMPTY_IMPORT_FILE;
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files::{HEAD_BYTES, beginning, is_backup};
-use crate::script_checksum::is_changed;
+use crate::script_checksum;
 use mocban_catalog::Catalog;
 use mocban_store::{CATALOG_FILE, Project, SETTINGS_FILE};
 
@@ -70,7 +70,7 @@ pub fn refuse_foreign_script(
     is_ours: impl FnOnce(&[u8]) -> bool,
 ) -> Result<(), Refusal> {
     match earlier_output(path, what, MAX_SCRIPT_BYTES, is_ours)? {
-        Some(earlier) if is_changed(&earlier) => Err(changed_output(path, what)),
+        Some(earlier) if script_checksum::is_changed(&earlier) => Err(changed_output(path, what)),
         Some(_) | None => Ok(()),
     }
 }

@@ -1,32 +1,19 @@
 //! The checksum in the file of a script for a shell, by which changes are found before another script replaces the file.
 
-use mocban_core::domain::ContentHash;
+use mocban_core::domain::{is_text_changed, with_text_checksum};
 
-/// What stands before the checksum, in the last line.
-const START: &str = "\n# checksum ";
-/// Hexadecimal digits of a checksum.
-const DIGITS: usize = 32;
+/// What stands before and behind the checksum, in the last line.
+const COMMENT: [&str; 2] = ["# checksum ", ""];
 
 /// Returns a script for a file, with a checksum in a comment at its end.
 pub fn with_checksum(script: &str) -> String {
-    let text = script.trim_end();
-    format!("{text}{START}{}\n", checksum(text))
+    with_text_checksum(script, COMMENT)
 }
 
 /// Returns whether the file of a script has another content than the script had. The ends of lines do not count. A file of an
 /// earlier version, without a checksum, counts as unchanged.
 pub(crate) fn is_changed(file: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(file).replace('\r', "");
-    let Some((script, rest)) = text.rsplit_once(START) else {
-        return false;
-    };
-    rest.trim_end() != checksum(script)
-}
-
-fn checksum(text: &str) -> String {
-    let mut digits = ContentHash::of(text.as_bytes()).to_hex();
-    digits.truncate(DIGITS);
-    digits
+    is_text_changed(file, &[COMMENT]) == Some(true)
 }
 
 #[cfg(test)]

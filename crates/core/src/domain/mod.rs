@@ -43,6 +43,7 @@ pub mod spelling;
 mod stage;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_values;
+mod text_checksum;
 mod transform;
 mod unique_keys;
 mod unit;
@@ -94,6 +95,7 @@ pub use seeded_random::SeededRandom;
 pub use separator_line::{SeparatorLines, named_separator};
 pub use significant::{fixed, significant};
 pub use stage::Stage;
+pub use text_checksum::{is_text_changed, with_text_checksum};
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unique_keys::KEY_TWICE;
 pub use unique_keys::UniqueKeys;

@@ -5,49 +5,28 @@
 
 use super::earlier_report::MARKDOWN_PROGRAM;
 use super::latex;
-use mocban_core::domain::ContentHash;
+use mocban_core::domain::{is_text_changed, with_text_checksum};
 
-/// Hexadecimal digits of a checksum.
-const DIGITS: usize = 32;
-/// What stands around the checksum in the last line of HTML and Markdown, and of LaTeX.
-const LAST_LINES: [[&str; 2]; 2] = [["<!-- checksum ", " -->"], ["% checksum ", ""]];
+/// The comment with the checksum in HTML and Markdown: what stands before and behind it.
+const MARKUP_COMMENT: [&str; 2] = ["<!-- checksum ", " -->"];
+/// The same in LaTeX.
+const LATEX_COMMENT: [&str; 2] = ["% checksum ", ""];
 
 /// Returns a report for a file: in HTML, Markdown and LaTeX, with a checksum of its content.
 pub fn with_checksum(report: &str) -> String {
-    let [before, behind] =
-        if report.starts_with("<!DOCTYPE html>") || report.contains(MARKDOWN_PROGRAM) {
-            LAST_LINES[0]
-        } else if report.starts_with(latex::PREAMBLE) {
-            LAST_LINES[1]
-        } else {
-            return report.to_owned();
-        };
-    let text = report.trim_end();
-    format!("{text}\n{before}{}{behind}\n", checksum(text))
+    if report.starts_with("<!DOCTYPE html>") || report.contains(MARKDOWN_PROGRAM) {
+        with_text_checksum(report, MARKUP_COMMENT)
+    } else if report.starts_with(latex::PREAMBLE) {
+        with_text_checksum(report, LATEX_COMMENT)
+    } else {
+        report.to_owned()
+    }
 }
 
 /// Returns whether the file of a report has another content than the report had. The ends of lines do not count. `None` if
 /// there is no checksum, as in files of earlier versions.
 pub fn is_changed(file: &[u8]) -> Option<bool> {
-    let text = String::from_utf8_lossy(file).replace('\r', "");
-    let mut lines = LAST_LINES.into_iter();
-    lines.find_map(|around| is_text_changed(text.trim_start_matches('\u{feff}'), around))
-}
-
-fn is_text_changed(text: &str, [before, behind]: [&str; 2]) -> Option<bool> {
-    let (content, rest) = text.rsplit_once(&format!("\n{before}"))?;
-    let (stored, rest) = rest.split_at_checked(DIGITS)?;
-    let rest = rest.strip_prefix(behind)?;
-    let is_checksum = stored.bytes().all(|byte| byte.is_ascii_hexdigit());
-    is_checksum.then(|| !rest.trim().is_empty() || checksum(content) != stored)
-}
-
-/// Returns the checksum of a text, whatever ends its lines and whatever white space follows.
-fn checksum(text: &str) -> String {
-    let text = text.replace('\r', "");
-    let mut digits = ContentHash::of(text.trim_end().as_bytes()).to_hex();
-    digits.truncate(DIGITS);
-    digits
+    is_text_changed(file, &[MARKUP_COMMENT, LATEX_COMMENT])
 }
 
 #[cfg(test)]
