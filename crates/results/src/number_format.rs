@@ -111,15 +111,6 @@ pub fn counted(n: u64, noun: &str) -> String {
     format!("{} {noun}{plural}", format_count(n))
 }
 
-/// Returns the counts that are not 0, such as `2 failed, 1 not finished`. Returns `None` if all counts are 0.
-pub fn count_list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
-    let known = counts.into_iter().filter(|(n, _)| *n > 0);
-    let parts: Vec<String> = known
-        .map(|(n, what)| format!("{} {what}", format_count(n)))
-        .collect();
-    (!parts.is_empty()).then(|| parts.join(", "))
-}
-
 /// Joins words by commas and, before the last one, by `and`.
 pub fn joined(words: &[String]) -> String {
     match words {
