@@ -153,15 +153,16 @@ pub async fn import(
     let outcome = "no verdict was recorded";
     let is_jsonl = files::is_jsonl(file, &bytes);
     let list = VerdictList::new(bytes, is_jsonl).map_err(|error| error.in_file(file, outcome))?;
-    let (list, names, decimal_names) = with_known_names(list, &catalog).await?;
+    let (list, names) = with_known_names(list, &catalog).await?;
     let NamesInList {
         first_lines,
+        unknown,
+        decimal_names,
         reviewers,
         mut refused,
         unread,
         day_first,
     } = names;
-    let unknown = unknown_in(&first_lines, &catalog).await?;
     if !unknown.is_empty() {
         let known = catalog.pair_names().await?;
         refused.extend(verdict_file::unknown_pairs(&first_lines, &unknown, &known));
@@ -206,33 +207,31 @@ pub async fn import(
     })
 }
 
-/// Returns a list in which unknown names such as `117.0` stand for the known pairs that they mean, its names, and a warning
-/// about the former.
+/// Returns a list in which unknown names such as `117.0` stand for the known pairs that they mean, and its names.
 async fn with_known_names(
     list: VerdictList,
     catalog: &Catalog,
-) -> ProjectResult<(VerdictList, NamesInList, Option<String>)> {
-    let names = NamesInList::read(&list);
-    let mut meant = verdict_file::without_decimals(&unknown_in(&names.first_lines, catalog).await?);
-    let wanted: Vec<PairName> = meant.values().cloned().collect();
-    let unknown: BTreeSet<PairName> = catalog.unknown_names(&wanted).await?.into_iter().collect();
-    meant.retain(|_, name| !unknown.contains(name));
+) -> ProjectResult<(VerdictList, NamesInList)> {
+    let mut names = NamesInList::read(&list);
+    let listed: Vec<PairName> = names.first_lines.keys().cloned().collect();
+    names.unknown = catalog.unknown_names(&listed).await?;
+    let mut meant = verdict_file::without_decimals(&names.unknown);
     if meant.is_empty() {
-        return Ok((list, names, None));
+        return Ok((list, names));
     }
-    let warning = verdict_file::decimal_names(&meant, &names.first_lines);
+    let wanted: Vec<PairName> = meant.values().cloned().collect();
+    let absent: BTreeSet<PairName> = catalog.unknown_names(&wanted).await?.into_iter().collect();
+    meant.retain(|_, name| !absent.contains(name));
+    let mut unknown = names.unknown;
+    unknown.retain(|name| !meant.contains_key(name));
+    let decimal_names = verdict_file::decimal_names(&meant, &names.first_lines);
     let list = list.with_meant(meant);
-    let names = NamesInList::read(&list);
-    Ok((list, names, warning))
-}
-
-/// Returns the names in a list that no pair has.
-async fn unknown_in(
-    first_lines: &BTreeMap<PairName, usize>,
-    catalog: &Catalog,
-) -> ProjectResult<Vec<PairName>> {
-    let names: Vec<_> = first_lines.keys().cloned().collect();
-    Ok(catalog.unknown_names(&names).await?)
+    let names = NamesInList {
+        unknown,
+        decimal_names,
+        ..NamesInList::read(&list)
+    };
+    Ok((list, names))
 }
 
 /// Names in a list of verdicts, and its refused lines.
@@ -240,6 +239,10 @@ async fn unknown_in(
 struct NamesInList {
     /// The first line of each pair.
     first_lines: BTreeMap<PairName, usize>,
+    /// Names that no pair has.
+    unknown: Vec<PairName>,
+    /// A warning about names such as `117.0` that are read as `117`.
+    decimal_names: Option<String>,
     reviewers: BTreeSet<String>,
     refused: Vec<RefusedLine>,
     /// The first line of each field that is not read.
