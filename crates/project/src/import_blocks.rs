@@ -18,8 +18,8 @@ use crate::lost_values::lost_values;
 use crate::manifest_file::{is_below_root, refuse, renamed_columns};
 use crate::missing_files::{MissingFiles, locate_file};
 use crate::new_project::{import_with, warn_about_name};
-use crate::pointer_files::FileSearches;
 use crate::repeated_files::RepeatedFiles;
+use crate::unusable_files::FileSearches;
 use mocban_catalog::{BlockAttributes, BlockImportSummary, SameFiles};
 use mocban_core::domain::{BlockName, BlockSide, FileKind, LengthUnit};
 use mocban_lists::manifest::{
@@ -169,7 +169,7 @@ pub async fn import_blocks(
     if missing.count == 0 {
         block_files::check(&listing.rows, &listing.label, &project)?;
     }
-    listing.warnings.extend(searches.pointers.warnings());
+    listing.warnings.extend(searches.unusable.warnings());
     let limits = location.settings()?.config.limits;
     let doubts = block_scale::doubts(&listing.rows, &listing.label, &project, &limits);
     listing.warnings.extend(doubts);

@@ -9,9 +9,9 @@ use super::files;
 use super::folder_files::{links_sentence, list_with_links};
 use super::input_paths::in_existing_form;
 use super::missing_files::locate_file;
-use super::pointer_files::FileSearches;
 use super::repeated_files::RepeatedFiles;
 use super::unread_files::{UnreadFiles, UnreadRows};
+use super::unusable_files::FileSearches;
 use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
 use mocban_core::domain::spelling::quoted;
@@ -278,7 +278,7 @@ impl Listing {
         };
         ListedRows {
             hash,
-            unusable: searches.pointers.warnings(),
+            unusable: searches.unusable.warnings(),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::files::listed;
 use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
-use super::pointer_files::FileSearches;
+use super::unusable_files::FileSearches;
 use mocban_core::domain::{first_names, sanitize};
 use mocban_store::Project;
 
@@ -32,7 +32,7 @@ const TAB_HINT: &str = "; its path has a tab: remove it";
 const IS_FOLDER: &str = "is a folder, not a file";
 
 /// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
-/// row with a label and a number; returns `None` if it exists. Counts pointers of Git LFS.
+/// row with a label and a number; returns `None` if it exists. Counts files that cannot be inputs.
 pub(crate) fn locate_file(
     (label, line): (&str, usize),
     kind: &str,
@@ -51,7 +51,7 @@ pub(crate) fn locate_file(
             match place.metadata() {
                 Ok(meta) if meta.is_dir() => IS_FOLDER.to_owned(),
                 Ok(meta) => {
-                    searches.pointers.add(&place, &meta);
+                    searches.unusable.add(&place, &meta);
                     return None;
                 }
                 // It may be in an object store.

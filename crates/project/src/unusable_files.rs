@@ -20,12 +20,12 @@ const MAX_OPENED: usize = 500;
 #[derive(Debug, Default)]
 pub(crate) struct FileSearches {
     pub(crate) similar: SimilarFiles,
-    pub(crate) pointers: PointerFiles,
+    pub(crate) unusable: UnusableFiles,
 }
 
 /// Pointers of Git LFS, and other files that cannot be inputs.
 #[derive(Debug, Default)]
-pub(crate) struct PointerFiles {
+pub(crate) struct UnusableFiles {
     pointers: CountedFiles,
     empty: CountedFiles,
     archives: CountedFiles,
@@ -51,7 +51,7 @@ impl CountedFiles {
     }
 }
 
-impl PointerFiles {
+impl UnusableFiles {
     /// Looks at a file.
     pub(crate) fn add(&mut self, path: &Path, meta: &Metadata) {
         if !meta.is_file() {
@@ -120,12 +120,12 @@ impl PointerFiles {
 
 #[cfg(test)]
 mod tests {
-    use super::PointerFiles;
+    use super::UnusableFiles;
 
     #[test]
     fn files_that_cannot_be_inputs_are_counted_with_the_first() {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let mut pointers = PointerFiles::default();
+        let mut found = UnusableFiles::default();
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n";
         let marked = format!("\u{feff}{pointer}");
         for (name, content) in [
@@ -140,12 +140,12 @@ mod tests {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");
             let meta = path.metadata().expect("a file");
-            pointers.add(&path, &meta);
+            found.add(&path, &meta);
         }
         let place = |name: &str| dir.path().join(name).display().to_string();
         let [first, empty, archive] = ["b.stl", "c.png", "d.stl"].map(place);
         assert_eq!(
-            pointers.warnings(),
+            found.warnings(),
             [
                 format!(
                     "files that are pointers of Git LFS and do not hold scans, prints or labels: 3, the first {first}; fetch them \
@@ -157,6 +157,6 @@ mod tests {
                 ),
             ]
         );
-        assert_eq!(PointerFiles::default().warnings(), [""; 0]);
+        assert_eq!(UnusableFiles::default().warnings(), [""; 0]);
     }
 }
