@@ -85,9 +85,8 @@ impl UnreadFiles {
 
 /// Returns what to do with files of a kind; `advice` knows meshes or images.
 fn advice_on(kind: FileKind, advice: fn(FileKind) -> Option<String>) -> Option<String> {
-    let is_archive = ARCHIVES.iter().any(|(_, archive)| *archive == kind);
     let unpack = || UNPACK.to_owned();
-    is_archive.then(unpack).or_else(|| advice(kind))
+    kind.is_archive().then(unpack).or_else(|| advice(kind))
 }
 
 /// Returns advice whose command is for all files with an extension such as `*.bmp`, with the extensions of these files as they

@@ -72,9 +72,7 @@ impl UnusableFiles {
             None => self.unreadable.add(path),
             Some(FileKind::LfsPointer) if may_be_pointer => self.pointers.add(path),
             // Those with the name of an archive are named by `unread_files`.
-            Some(FileKind::Other(name))
-                if name.ends_with(" archive") && archive_kind(path).is_none() =>
-            {
+            Some(found) if found.is_archive() && archive_kind(path).is_none() => {
                 self.archives.add(path);
             }
             Some(_) => {}

@@ -209,6 +209,11 @@ impl FileKind {
         }
     }
 
+    /// Returns whether files of this type must be unpacked.
+    pub fn is_archive(self) -> bool {
+        matches!(self, Self::Other(name) if name.ends_with(" archive"))
+    }
+
     /// Returns the type that files with an extension usually are, if it is not read.
     pub fn of_unread_extension(extension: &str) -> Option<Self> {
         let extension = extension.to_ascii_lowercase();
