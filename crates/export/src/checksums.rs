@@ -1,4 +1,5 @@
-//! The checksums of the files in an export or another folder of outputs, by which files that somebody edited or added are found before they are replaced.
+//! The checksums of the files in an export or another folder of outputs, by which files that somebody edited or added are found
+//! before they are replaced.
 //!
 //! `b3sum --check` reads them: each line has the BLAKE3 hash of a file and its path.
 
@@ -10,6 +11,7 @@ use std::path::{Component, Path, PathBuf};
 use rayon::prelude::*;
 
 use super::export_folder::{FolderError, SharedFile, at};
+use super::manifest::is_regular_file;
 use mocban_core::domain::ContentHash;
 use mocban_core::domain::cancel::poll;
 
@@ -23,7 +25,7 @@ const MAX_LINE: u64 = 8 << 10;
 /// Writes the checksums of all files below a folder.
 ///
 /// # Errors
-/// Returns an error if a file cannot be read or the checksums not be written.
+/// Returns an error if a file cannot be read, or if the checksums cannot be written.
 pub fn write_checksums(root: &Path) -> Result<(), FolderError> {
     let mut lines = SharedFile::create(root, CHECKSUMS)?;
     visit_files(root, &mut |names: &[String]| {
@@ -42,7 +44,7 @@ pub fn write_checksums(root: &Path) -> Result<(), FolderError> {
     lines.flush()
 }
 
-/// Refuses an earlier export of which somebody edited a file, or to which somebody added one. Exports of earlier versions have
+/// Refuses an earlier export in which somebody edited a file, or to which somebody added one. Exports of earlier versions have
 /// no checksums and are not refused. Files that were removed are no loss.
 ///
 /// # Errors
@@ -67,13 +69,8 @@ enum EditedFile {
 /// Returns a file of an earlier export that somebody edited or added. `None` if there is none, or if there are no checksums.
 fn edited_file(dir: &Path) -> Result<Option<EditedFile>, FolderError> {
     let path = dir.join(CHECKSUMS);
-    match fs::symlink_metadata(&path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        found => {
-            if !found.map_err(at(&path))?.is_file() {
-                return Ok(None);
-            }
-        }
+    if !is_regular_file(&path).map_err(at(&path))? {
+        return Ok(None);
     }
     let mut known = 0;
     let mut list = ChecksumList::open(&path)?;
@@ -170,7 +167,7 @@ enum ListedFileState {
 }
 
 impl ListedFile {
-    /// Parses a line. Returns `None` if it is none of the checksums.
+    /// Parses a line. Returns `None` if it has no checksum of a file below the folder.
     fn of(line: &[u8]) -> Option<Self> {
         let line = std::str::from_utf8(line).ok()?;
         let (hash, below) = line.trim_end_matches(['\r', '\n']).split_once("  ")?;
@@ -184,10 +181,7 @@ impl ListedFile {
 
     fn state(&self, dir: &Path) -> Result<ListedFileState, FolderError> {
         let path = dir.join(&self.below);
-        let is_file = match fs::symlink_metadata(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            found => found.map_err(at(&path))?.is_file(),
-        };
+        let is_file = is_regular_file(&path).map_err(at(&path))?;
         Ok(if !is_file {
             ListedFileState::Removed
         } else if hash_of(&path).map_err(at(&path))? == self.hash {
@@ -202,7 +196,7 @@ impl ListedFile {
 struct ChecksumList {
     path: PathBuf,
     lines: BufReader<File>,
-    /// Whether a line was none of the checksums, so that the rest is not read.
+    /// Whether a line had no checksum. The rest is then not read.
     is_damaged: bool,
 }
 

@@ -127,13 +127,8 @@ pub(super) fn foreign_entry(dir: &Path) -> io::Result<Option<PathBuf>> {
 
 /// Returns the paths that a manifest lists, or `None` if the file does not exist or is not a manifest.
 fn listed_files(path: &Path) -> io::Result<Option<BTreeSet<String>>> {
-    match fs::symlink_metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        found => {
-            if !found?.is_file() {
-                return Ok(None);
-            }
-        }
+    if !is_regular_file(path)? {
+        return Ok(None);
     }
     let mut text = Vec::new();
     fs::File::open(path)?
@@ -143,6 +138,14 @@ fn listed_files(path: &Path) -> io::Result<Option<BTreeSet<String>>> {
     Ok(list
         .filter(|list| list.mocban_export == VERSION)
         .map(|list| list.files))
+}
+
+/// Returns whether there is a regular file at a path. A link is none.
+pub(super) fn is_regular_file(path: &Path) -> io::Result<bool> {
+    match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        found => Ok(found?.is_file()),
+    }
 }
 
 /// Returns whether a path has the form of a pattern, in which `*` stands for the id of a pair.
