@@ -52,42 +52,37 @@ pub(super) fn accuracy(report: &Report) -> CountedText {
 
 /// Returns how many of the decided results were passed.
 fn decided(row: &MetricRow) -> CountedText {
-    let of_metric = |joint| CountedPairs::Judged(row.metric, joint);
+    let of_metric = |joint| vec![CountedPairs::Judged(row.metric, joint)];
     let decided = row.passed + row.failed;
-    let counts = [
-        (row.passed, of_metric(JointVerdict::Passed)),
-        (decided, of_metric(JointVerdict::Decided)),
-    ];
-    let pattern = match decided {
-        1 => "{} of {} decided result.",
-        _ => "{} of {} decided results.",
-    };
-    CountedText::filled(pattern, &counts)
+    let mut text = CountedText::default();
+    text.push_count(row.passed, of_metric(JointVerdict::Passed));
+    text.push(" of ");
+    text.push_counted(decided, "decided result", of_metric(JointVerdict::Decided));
+    text.push(".");
+    text
 }
 
 /// Returns the sentence on results that were judged and count neither as passed nor as failed, or an empty text.
 fn undecided(row: &MetricRow) -> CountedText {
+    let of_metric = |joint| CountedPairs::Judged(row.metric, joint);
     let unsure = row.unsure - row.conflicts;
-    let rest = [
+    let counts = [
         (
             row.conflicts,
-            JointVerdict::Conflict,
+            of_metric(JointVerdict::Conflict),
             " on which reviewers disagree",
         ),
         (
             unsure,
-            JointVerdict::Unsure,
+            of_metric(JointVerdict::Unsure),
             " about which they were unsure",
         ),
     ];
-    let rest = rest.into_iter().filter(|(n, _, _)| *n > 0);
+    let rest = CountedText::listed(counts, " and ");
     let mut sentence = CountedText::default();
-    for (i, (n, joint, what)) in rest.enumerate() {
-        sentence.push(if i == 0 { " Not counted: " } else { " and " });
-        sentence.push_count(n, vec![CountedPairs::Judged(row.metric, joint)]);
-        sentence.push(what);
-    }
-    if !sentence.is_empty() {
+    if !rest.is_empty() {
+        sentence.push(" Not counted: ");
+        sentence.append(rest);
         sentence.push(".");
     }
     sentence

@@ -57,6 +57,22 @@ impl CountedText {
         text
     }
 
+    /// Lists the counts that are not 0, each with the words behind it. Returns an empty text if all counts are 0.
+    pub(super) fn listed<const N: usize>(
+        counts: [(u64, CountedPairs, &str); N],
+        separator: &str,
+    ) -> Self {
+        let mut list = Self::default();
+        for (count, pairs, words) in counts.into_iter().filter(|(count, ..)| *count > 0) {
+            if !list.is_empty() {
+                list.push(separator);
+            }
+            list.push_count(count, vec![pairs]);
+            list.push(words);
+        }
+        list
+    }
+
     /// Adds words.
     pub(super) fn push(&mut self, words: &str) {
         self.text.push_str(words);
@@ -66,6 +82,13 @@ impl CountedText {
     pub(super) fn push_count(&mut self, count: u64, pairs: Vec<CountedPairs>) {
         let pairs = if count == 0 { Vec::new() } else { pairs };
         self.push_text_of_count(&format_count(count), pairs);
+    }
+
+    /// Adds a count with its noun, such as `1 pair` and `2,000 pairs`.
+    pub(super) fn push_counted(&mut self, count: u64, noun: &str, pairs: Vec<CountedPairs>) {
+        self.push_count(count, pairs);
+        let plural = if count == 1 { "" } else { "s" };
+        self.push(&format!(" {noun}{plural}"));
     }
 
     /// Adds the text of a count.
@@ -172,5 +195,24 @@ mod tests {
         );
         let json = serde_json::to_value(&text).expect("JSON");
         assert_eq!(json, "1,234 are aligned, 0 failed; 1,240 in all.");
+    }
+
+    #[test]
+    fn counts_are_listed_unless_they_are_0() {
+        let list = |failed, rest| {
+            let counts = [
+                (failed, CountedPairs::Failed, " failed"),
+                (rest, CountedPairs::Unfinished, " not finished"),
+            ];
+            CountedText::listed(counts, " and ")
+        };
+        assert_eq!(list(2, 1_000), "2 failed and 1,000 not finished");
+        assert_eq!(list(0, 1), "1 not finished");
+        assert_eq!(list(0, 0), CountedText::default());
+        let mut text = CountedText::default();
+        for count in [1, 2] {
+            text.push_counted(count, "pair", vec![CountedPairs::All]);
+        }
+        assert_eq!(text, "1 pair2 pairs");
     }
 }

@@ -71,20 +71,18 @@ fn aligned(report: &Report) -> CountedText {
     if let Some(clause) = low_confidence(progress.done, row) {
         sentence.append(clause);
     }
-    let rest = [
-        (progress.failed, CountedPairs::Failed, ["failed"; 2]),
-        (
-            progress.pending,
-            CountedPairs::Unfinished,
-            ["is not finished", "are not finished"],
-        ),
+    let unfinished = match progress.pending {
+        1 => " is not finished",
+        _ => " are not finished",
+    };
+    let counts = [
+        (progress.failed, CountedPairs::Failed, " failed"),
+        (progress.pending, CountedPairs::Unfinished, unfinished),
     ];
-    let rest = rest.into_iter().filter(|(n, _, _)| *n > 0);
-    for (i, (n, pairs, [one, more])) in rest.enumerate() {
-        sentence.push(if i == 0 { "; " } else { " and " });
-        sentence.push_count(n, vec![pairs]);
-        sentence.push(" ");
-        sentence.push(if n == 1 { one } else { more });
+    let rest = CountedText::listed(counts, " and ");
+    if !rest.is_empty() {
+        sentence.push("; ");
+        sentence.append(rest);
     }
     sentence.push(".");
     sentence

@@ -102,23 +102,15 @@ fn missing_pairs(progress: PairProgress) -> Option<CountedText> {
     };
     let mut warning = CountedText::default();
     warning.push_count(missing, listed);
-    warning.append(CountedText::filled(
-        " of {} ",
-        &[(done + missing, CountedPairs::All)],
-    ));
-    let noun = if done + missing == 1 { "pair" } else { "pairs" };
+    warning.push(" of ");
+    warning.push_counted(done + missing, "pair", vec![CountedPairs::All]);
     let verb = if missing == 1 { "is" } else { "are" };
-    warning.push(&format!("{noun} {verb} in no row: "));
+    warning.push(&format!(" {verb} in no row: "));
     let counts = [
         (failed, CountedPairs::Failed, " failed"),
         (pending, CountedPairs::Unfinished, " not finished"),
     ];
-    let counts = counts.into_iter().filter(|(n, _, _)| *n > 0);
-    for (i, (n, pairs, what)) in counts.enumerate() {
-        warning.push(if i == 0 { "" } else { ", " });
-        warning.push_count(n, vec![pairs]);
-        warning.push(what);
-    }
+    warning.append(CountedText::listed(counts, ", "));
     warning.push(".");
     Some(warning)
 }
@@ -210,13 +202,8 @@ impl Qualification {
         let titles: Vec<&str> = metrics.iter().map(|metric| metric.title()).collect();
         let mut sentence = CountedText::from(format!("{}: of ", titles.join(", ")));
         let aligned = (self.results == done).then_some(CountedPairs::Aligned);
-        sentence.push_count(self.results, aligned.into_iter().collect());
-        let noun = if self.results == 1 {
-            "result"
-        } else {
-            "results"
-        };
-        sentence.push(&format!(" {noun}, "));
+        sentence.push_counted(self.results, "result", aligned.into_iter().collect());
+        sentence.push(", ");
         let pairs = metrics.iter().filter_map(|metric| {
             let joint = self.joint?;
             Some(CountedPairs::Judged(*metric, joint))
