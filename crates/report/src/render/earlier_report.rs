@@ -162,10 +162,21 @@ mod tests {
 
     #[test]
     fn every_format_is_recognized_and_files_of_a_project_are_not() {
-        for pairs in [0, 1] {
+        // Each count has another first sentence.
+        for (done, pending) in [
+            (0, 0),
+            (1, 0),
+            (0, 1),
+            (0, 2),
+            (2, 0),
+            (1, 1),
+            (2, 1),
+            (3, 0),
+        ] {
             let mut report = ReportAccumulator::default();
-            for _ in 0..pairs {
-                let pair = test_fixtures::done("a", 0.75, &[]);
+            let done = (0..done).map(|i| test_fixtures::done(&format!("a{i}"), 0.75, &[]));
+            let pending = (0..pending).map(|i| test_fixtures::pending(&format!("b{i}")));
+            for pair in done.chain(pending) {
                 report.add(&pair, &TruthEvaluation::default());
             }
             let report = report.finish();
