@@ -53,7 +53,7 @@ pub(super) fn characters(found: Vec<PageElement>) -> (Vec<LabelRegion>, Vec<Stri
     (regions, warnings.into_iter().flatten().collect())
 }
 
-/// Returns a warning about elements, if there are any; `outcomes` say what became of one and of several.
+/// Returns a warning about elements, if there are any; `one` says what became of one of them, `outcome` what became of several.
 fn warning<'e>(
     elements: impl Iterator<Item = &'e PageElement>,
     [one, outcome]: [&str; 2],
