@@ -341,7 +341,7 @@ class Alignment(Frozen):
         Raises
         ------
         ProjectError
-            If the folder holds other files, or cannot be written.
+            If the folder holds other files, or one that somebody changed, or cannot be written.
         """
         warning = self._aligned().save(os.fspath(dir))
         if warning:

@@ -475,7 +475,7 @@ class Project:
         Parameters
         ----------
         dir : path-like
-            An earlier export there is replaced as a whole. Several formats get a folder each.
+            An earlier export there is replaced as a whole, unless somebody changed it. Several formats get a folder each.
         formats : str or sequence of str
             Such as ``"jsonl"``, ``"csv"``, ``"parquet"`` or ``"huggingface"``.
         metrics : sequence of str, optional
