@@ -57,7 +57,7 @@ pub fn refuse_edited(target: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// A file of an export that would be lost with it.
+/// A file that would be lost if the export were replaced.
 #[derive(Debug, PartialEq, Eq)]
 enum EditedFile {
     /// It has another content than the export.

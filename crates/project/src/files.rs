@@ -34,8 +34,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     Ok(bytes)
 }
 
-/// Returns the name of the document that has a file as its lock file. Office programs write one beside an open document;
-/// Excel leaves out the first letters of some names.
+/// Returns the name of the document whose lock file this is. Office programs write such a file beside an open document; Excel
+/// leaves out the first letters of some names.
 fn locked_document(path: &Path) -> Option<String> {
     let name = path.file_name()?.to_str()?;
     let of_libre_office = || name.strip_prefix(".~lock.")?.strip_suffix('#');

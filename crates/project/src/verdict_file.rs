@@ -32,7 +32,7 @@ use mocban_system::time_text::{day, duration};
 pub struct VerdictList {
     text: ListText,
     layout: VerdictLayout,
-    /// Pairs that are meant by other names.
+    /// Pairs that the list names in another way, by the name in the list.
     meant: Arc<BTreeMap<PairName, PairName>>,
 }
 
@@ -93,7 +93,7 @@ impl VerdictList {
         })
     }
 
-    /// Returns the list with other names of pairs, each by its name in the list.
+    /// Returns the list with pairs in place of the names that mean them. `meant` has each pair by the name in the list.
     #[must_use]
     pub fn with_meant(self, meant: BTreeMap<PairName, PairName>) -> Self {
         let meant = Arc::new(meant);

@@ -1,4 +1,4 @@
-//! Sentences with counts of pairs, which know which pairs they count.
+//! Sentences with counts of pairs, each with the pairs that it counts.
 
 use std::fmt;
 use std::ops::{Deref, Range};
@@ -33,7 +33,7 @@ pub enum CountedPairs {
 pub enum TextPart<'t> {
     /// Words, or numbers of other things.
     Words(&'t str),
-    /// A count with the pairs that it counts: several lists of pairs if they are as many.
+    /// A count with the pairs that it counts, or with several lists of pairs that all have this count.
     Count(&'t str, &'t [CountedPairs]),
 }
 

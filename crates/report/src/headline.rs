@@ -37,7 +37,7 @@ pub(super) fn headline(report: &Report) -> Vec<CountedText> {
     sentences
 }
 
-/// Returns the sentence on a project whose pairs are all retired, as a clause says.
+/// Returns the sentence on a project whose pairs are all retired. `clause` says so, with their number.
 fn nothing_to_report(clause: &str, retired: u64) -> CountedText {
     let mut sentence = CountedText::from("There is nothing to report: ");
     let count = retired.to_string();

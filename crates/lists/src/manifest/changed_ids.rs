@@ -18,7 +18,7 @@ const YEARS: RangeInclusive<u32> = 1900..=2100;
 
 /// Least number that spreadsheet programs shorten.
 const LONG_NUMBER: f64 = 1e11;
-/// Number of decimals of a power of ten that are too many for an id.
+/// Fewest decimals of a power of ten that no id has.
 const MANY_DECIMALS: usize = 3;
 
 /// Finds ids in the forms in which spreadsheet programs write dates and powers of ten: `1-Nov`, `Nov-01`, `01-Thg11`,

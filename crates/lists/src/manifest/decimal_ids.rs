@@ -21,7 +21,7 @@ impl DecimalIds {
         }
     }
 
-    /// Returns a warning, if the list has some of them without `.0`, too.
+    /// Returns a warning if the list also has some of them without `.0`.
     pub fn warning(&self, ids: &RowIds) -> Option<String> {
         let is_doubled = |id: &str| {
             let whole = PairName::new(whole_part(id)?).ok()?;

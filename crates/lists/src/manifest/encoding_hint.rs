@@ -16,17 +16,17 @@ const NOT_TCVN3: [u8; 19] = [
     0xda, 0xdb, 0xff,
 ];
 
-/// Returns what to do about a list that is not UTF-8, with its likely encoding: one of Chinese or Japanese with two bytes for a
-/// character, TCVN3 with the fonts of older Vietnamese texts, or Windows-1258 or Windows-1252, in which spreadsheet programs save
-/// CSV files in Vietnam and in western countries. Only lines that are not UTF-8 are considered. Returns nothing if one of them
-/// is not text, or if none of these encodings is likely.
+/// Returns what to do about a list that is not UTF-8, with its likely encoding: a two-byte encoding of Chinese or Japanese, TCVN3,
+/// which older Vietnamese fonts use, or Windows-1258 or Windows-1252, in which spreadsheet programs save CSV files in Vietnam and
+/// in western countries. Only lines that are not UTF-8 are considered. Returns nothing if one of them is not text or has no
+/// ASCII letters.
 pub(super) fn encoding_hint(list: &[u8]) -> String {
     let lines = list.split(|byte| *byte == b'\n');
     let lines: Vec<&[u8]> = lines
         .filter(|line| std::str::from_utf8(line).is_err())
         .collect();
     let is_text = |byte: &u8| *byte >= 0x20 || byte.is_ascii_whitespace();
-    // In all of them, lists mix ASCII letters with bytes above ASCII.
+    // In all of these encodings, lists mix ASCII letters with bytes above ASCII.
     let is_words =
         |line: &&[u8]| line.iter().all(is_text) && line.iter().any(u8::is_ascii_alphabetic);
     if !lines.iter().all(is_words) {
@@ -53,7 +53,7 @@ pub(super) fn encoding_hint(list: &[u8]) -> String {
     format!("; it seems to be {name}: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")")
 }
 
-/// Returns the name of the encoding with two bytes for a character in which lines are words, if there is one.
+/// Returns the name of the two-byte encoding in which all lines are text, if there is one.
 fn two_byte_encoding(lines: &[&[u8]]) -> Option<&'static str> {
     let pairs: Vec<[u8; 2]> = (lines.iter())
         .map(|line| two_byte_characters(line))
@@ -85,8 +85,8 @@ fn two_byte_encoding(lines: &[&[u8]]) -> Option<&'static str> {
     }
 }
 
-/// Returns the characters of two bytes in a line, of which at least two follow each other. Returns `None` if a byte above ASCII
-/// has no second one, or if a letter of ASCII stands beside a character, as in words of other languages.
+/// Returns the two-byte characters of a line. Returns `None` if no two of them follow each other, if a byte above ASCII has no
+/// second one, or if an ASCII letter stands beside a character, as in words of other languages.
 fn two_byte_characters(line: &[u8]) -> Option<Vec<[u8; 2]>> {
     let mut found = Vec::new();
     let (mut at, mut longest, mut run) = (0, 0, 0);
@@ -110,7 +110,7 @@ fn two_byte_characters(line: &[u8]) -> Option<Vec<[u8; 2]>> {
     (longest >= 2).then_some(found)
 }
 
-/// Returns whether lines have letters of TCVN3 inside words that are signs in other encodings, and no byte that it does not use.
+/// Returns whether all bytes above ASCII are letters of TCVN3, and one behind an ASCII letter is a sign in other encodings.
 fn is_tcvn3(lines: &[&[u8]]) -> bool {
     let is_used = |byte: &u8| byte.is_ascii() || *byte > 0xa0 && !NOT_TCVN3.contains(byte);
     let has_sign = |line: &&[u8]| {

@@ -79,7 +79,7 @@ fn begins_like_report(text: &str) -> bool {
     FIRST_WORDS.iter().any(|words| start.starts_with(words))
 }
 
-/// Characters in which the first words of a report have ended.
+/// Longest beginning of a report that is compared, in characters.
 const MAX_START: usize = 120;
 
 /// Beginnings of reports, with `N` for counts.
