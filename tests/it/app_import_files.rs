@@ -247,7 +247,7 @@ fn a_block_is_shown_with_its_page_labels_and_scan_before_the_import() {
         let image = decode(&reply.body, &ImageLimits::SUGGESTED).expect("a picture");
         let longest = image.rgb.width().max(image.rgb.height());
         assert!((500..=560).contains(&longest), "{kind}: {longest} pixels");
-        image.rgb
+        image.rgb.to_rgb16().into_owned()
     };
     let is_vermillion = |colour: &[u16; 3]| {
         let [red, green, blue] = colour.map(|value| value >> 8);

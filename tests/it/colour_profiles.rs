@@ -74,7 +74,9 @@ fn a_print_has_the_results_of_its_srgb_twin() {
         .expect("the pair is made");
     let print = decode(&pair.print, &ImageLimits::SUGGESTED)
         .expect("a picture")
-        .rgb;
+        .rgb
+        .to_rgb16()
+        .into_owned();
     let scan = Scan::from(pair.mesh);
     let grey = print.map(|[_, green, _]| [*green; 3]);
     for (name, profile, is_grey) in [

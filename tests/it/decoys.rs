@@ -211,7 +211,7 @@ fn folded(index: u64) -> DecoyPair {
     let pair = PairGenerator::new(Tier::Upright, 1).pair(index);
     let pair = pair.expect("images encode");
     let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("an image");
-    let flat = print.to_rgb8();
+    let flat = print.rgb.to_rgb8();
     let (width, height) = (flat.width(), flat.height());
     let paper = flat.at(1, 1);
     let (sin, cos) = 30_f64.to_radians().sin_cos();

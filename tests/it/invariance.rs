@@ -201,8 +201,9 @@ fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintIma
     let side = |length: usize, added: i64| (length as i64 + added) as usize;
     let width = side(print.rgb.width(), left + right);
     let height = side(print.rgb.height(), top + bottom);
+    let colours = print.rgb.to_rgb16();
     let rgb = Grid::from_fn(width, height, |x, y| {
-        let from = print.rgb.get(x as i64 - left, y as i64 - top);
+        let from = colours.get(x as i64 - left, y as i64 - top);
         from.unwrap_or([u16::MAX; 3])
     });
     let motion = Affine2::scale_shift(1.0, [left as f64, top as f64]);

@@ -23,7 +23,7 @@ pub(crate) fn enlarge(path: &Path, pixels: usize) {
     let small = decode(&bytes, &ImageLimits::SUGGESTED)
         .expect("a picture")
         .rgb;
-    let times = (pixels / small.data().len()).isqrt();
+    let times = (pixels / (small.width() * small.height())).isqrt();
     let color = |x: usize, y: usize| {
         let of_16_bits = small.at(x / times, y / times);
         of_16_bits.map(|channel| (channel >> 8) as u8)

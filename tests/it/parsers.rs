@@ -39,7 +39,7 @@ fn read_mesh(name: &str, bytes: &[u8]) -> Result<(), String> {
 
 fn read_image(_: &str, bytes: &[u8]) -> Result<(), String> {
     let picture = raster::decode(bytes, &IMAGE).map_err(|error| error.to_string())?;
-    assert!(picture.rgb.data().len() as u64 <= IMAGE.max_pixels);
+    assert!((picture.rgb.width() * picture.rgb.height()) as u64 <= IMAGE.max_pixels);
     Ok(())
 }
 

@@ -159,7 +159,7 @@ fn the_print_registers_with_the_relief() {
             let pixel = numbers(&vertex["pixel"]);
             let distance = (pixel[0] - expected[0]).hypot(pixel[1] - expected[1]);
             assert!(distance < 1.0, "{vertex}: {expected:?}");
-            let Some(colour) = uniform_colour(&print.rgb, expected) else {
+            let Some(colour) = uniform_colour(&print.rgb.to_rgb16(), expected) else {
                 continue;
             };
             let shown = numbers(&vertex["colour"]);

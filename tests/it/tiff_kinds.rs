@@ -7,7 +7,7 @@ use crate::tiff_file::{FLOAT, INT, PALETTE, RGB, TiffFile, WHITE_IS_ZERO};
 fn read(file: &TiffFile) -> Result<Grid<[u16; 3]>, String> {
     let picture = decode(&file.encode(), &ImageLimits::SUGGESTED);
     picture
-        .map(|picture| picture.rgb)
+        .map(|picture| picture.rgb.to_rgb16().into_owned())
         .map_err(|error| error.to_string())
 }
 

@@ -22,7 +22,7 @@ fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
     let pairs = PairGenerator::new(Tier::Upright, 5).with_vertices(Some(12_000));
     let pair = pairs.pair(0).expect("images encode");
     let print = decode(&pair.print, &ImageLimits::SUGGESTED).expect("an image");
-    let groups = print_forms::groups(&print.to_rgb8());
+    let groups = print_forms::groups(&print.rgb.to_rgb8());
     let refused = [
         (
             "pointer.png",
@@ -31,7 +31,7 @@ fn every_form_of_a_print_is_aligned_like_its_plain_twin() {
         ),
         (
             "pages.tif",
-            print_forms::two_pages(&print.to_rgb8()),
+            print_forms::two_pages(&print.rgb.to_rgb8()),
             "the TIFF image has 2 pages, 2 of them of full size; a print is one page: save it as its own file",
         ),
     ];

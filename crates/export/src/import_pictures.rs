@@ -2,7 +2,7 @@
 
 use crate::pictures::{Rgb, VERMILLION, mark_edges, resized, shaded};
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
-use mocban_core::raster::{Grid, PrintImage, reduce};
+use mocban_core::raster::{Colours, Grid, PrintImage, reduce};
 
 /// Highest level of a height.
 const LEVELS: f64 = 65_000.0;
@@ -23,13 +23,10 @@ pub fn page_with_boxes(page: &PrintImage, boxes: &[[f64; 4]], longest: usize) ->
     // Fewer pixels are converted if those of a large page are reduced before.
     let times = (0.5 / scale).floor() as u32;
     let mut picture = if times > 1 {
-        resized(
-            &PrintImage::from(reduce(&page.rgb, times)).to_rgb8(),
-            width,
-            height,
-        )
+        let reduced = Colours::from(reduce(&page.rgb, times));
+        resized(&reduced.to_rgb8(), width, height)
     } else {
-        resized(&page.to_rgb8(), width, height)
+        resized(&page.rgb.to_rgb8(), width, height)
     };
     // Edges are between pixels, whose centres have whole coordinates.
     let edges = |bounds: &[f64; 4]| bounds.map(|edge| (edge + 0.5) * scale);

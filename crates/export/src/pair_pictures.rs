@@ -175,9 +175,9 @@ impl<'a> PairPictures<'a> {
 
     /// Returns the print in the frame of the pictures, 8 bits per channel.
     pub(super) fn print_rgb(&self) -> Result<Rgb, PictureError> {
-        let print = self.source_print()?.picture.to_rgb8();
+        let print = self.source_print()?.picture.rgb.to_rgb8();
         Ok(match self.canvas {
-            None => print,
+            None => print.into_owned(),
             Some((side, from_print)) => warp_rgb(&print, &from_print, side, side),
         })
     }

@@ -106,7 +106,7 @@ impl SourcePrint {
     pub(super) fn upright_file(&self) -> Cow<'_, [u8]> {
         match self.picture.turned {
             None => Cow::Borrowed(&self.file.bytes),
-            Some(_) => Cow::Owned(png_rgb8(&self.picture.to_rgb8())),
+            Some(_) => Cow::Owned(png_rgb8(&self.picture.rgb.to_rgb8())),
         }
     }
 

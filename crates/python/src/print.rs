@@ -87,15 +87,15 @@ impl NativePrint {
     /// Returns the colours in 8 bits.
     fn rgb8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let image = self.image();
-        let colours = compute(py, None, move || image().image().to_rgb8())?;
+        let colours = compute(py, None, move || image().image().rgb.to_rgb8().into_owned())?;
         Ok(PyArray1::from_slice(py, colours.data().as_flattened()))
     }
 
     /// Returns the colours in 16 bits.
     fn rgb16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
         let print = compute(py, None, self.image())?;
-        let colours = print.image().rgb.data().as_flattened();
-        Ok(PyArray1::from_slice(py, colours))
+        let colours = print.image().rgb.to_rgb16();
+        Ok(PyArray1::from_slice(py, colours.data().as_flattened()))
     }
 
     /// Returns the ink of the likeliest interpretation.

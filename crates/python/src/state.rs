@@ -88,7 +88,7 @@ pub(crate) fn held_bytes(pair: &AlignedPair, print: &Print) -> usize {
     let maps = pair.registered.stroke_maps.iter();
     let maps: usize = maps.map(|map| map.data().len()).sum();
     size_of_val(pair.depth.levels.data())
-        + size_of_val(print.image().rgb.data())
+        + print.image().rgb.bytes()
         + MASK_PIXEL_BYTES * masks
         + maps
 }
@@ -117,6 +117,7 @@ pub(crate) fn save(pair: &AlignedPair, print: &Print) -> (String, Vec<u8>) {
     images.extend(
         image
             .rgb
+            .to_rgb16()
             .data()
             .as_flattened()
             .iter()
@@ -151,7 +152,7 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
     let maps = maps.map(|side| Grid::from_vec(*side, *side, images.eight([*side; 2])?));
     let stroke_maps = maps.collect::<Option<Vec<_>>>()?;
     let print = PrintImage {
-        rgb,
+        rgb: rgb.into(),
         turned: numbers.print_turned,
         ignored_profile: numbers.ignored_profile,
     };

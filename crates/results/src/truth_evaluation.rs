@@ -123,7 +123,7 @@ fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
         .map_err(|error| TruthError::Mask(error.to_string()))?;
     let picture =
         raster::decode(&file.bytes, &limits).map_err(|error| refused(error.to_string()))?;
-    Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
+    Ok(picture.rgb.map(|[level, ..]| (level / 257) as u8))
 }
 
 /// Warps a metric's depth mask to the print. Returns the mask's intersection over union with the true stroke tops.

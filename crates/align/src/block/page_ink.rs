@@ -127,17 +127,18 @@ impl InkSampler<'_> {
 /// Returns the brightness of each pixel, 0..=255.
 fn grey(page: &PrintImage) -> Grid<u8> {
     let rgb = &page.rgb;
-    let bright = |[r, g, b]: &[u16; 3]| {
-        let sum = 77 * u32::from(*r) + 150 * u32::from(*g) + 29 * u32::from(*b);
+    let bright = |[r, g, b]: [u16; 3]| {
+        let sum = 77 * u32::from(r) + 150 * u32::from(g) + 29 * u32::from(b);
         (sum >> 16) as u8
     };
-    let data: Vec<u8> = rgb
-        .data()
-        .par_iter()
-        .with_min_len(1 << 16)
-        .map(bright)
-        .collect();
-    Grid::from_vec(rgb.width(), rgb.height(), data).expect("one value for each pixel")
+    let mut grey = Grid::new(rgb.width(), rgb.height(), 0);
+    let rows = grey.data_mut().par_chunks_mut(rgb.width().max(1));
+    rows.enumerate().for_each(|(y, row)| {
+        for (x, grey) in row.iter_mut().enumerate() {
+            *grey = bright(rgb.at(x, y));
+        }
+    });
+    grey
 }
 
 /// Brightness of the sheet around each cell; 0 on the bed.

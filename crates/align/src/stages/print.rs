@@ -191,7 +191,7 @@ mod tests {
             let is_ink = (is_wide(x) || is_thin(x)) && (20..140).contains(&y);
             [if is_ink { 9_000 } else { 50_000 }; 3]
         });
-        let small = Print::from(PrintImage::from(reduce(&paper, 10)));
+        let small = Print::from(PrintImage::from(reduce(&paper.into(), 10)));
         let mask = &small.hypotheses().expect("ink")[0].mask;
         let parts_per_px = 160.0 / mask.width() as f64;
         let width = |from: usize, to: usize| {

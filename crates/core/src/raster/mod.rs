@@ -1,6 +1,7 @@
 //! Images and masks in memory, their decoders and encoders, and warps. [`Grid`] states the pixel convention.
 
 pub mod blur;
+mod colours;
 pub mod components;
 mod decode;
 mod depth_map;
@@ -22,6 +23,7 @@ mod warp_depth;
 mod warp_mask;
 mod warp_rgb;
 
+pub use colours::Colours;
 pub use decode::{
     DecodeError, ImageLimits, PrintImage, PrintSamples, SampleSlice, decode, file_dpi,
     header_pixel_count, header_size, profile_warning, stated_dpi,

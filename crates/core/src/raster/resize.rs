@@ -1,6 +1,7 @@
 //! Enlarges or reduces colours a whole number of times, and brings masks of that size back to the size of the print.
 
-use super::{Grid, Mask};
+use super::colours::widen;
+use super::{Colours, Grid, Mask};
 use crate::domain::MaskScale;
 use crate::domain::cancel::poll;
 
@@ -11,17 +12,17 @@ use crate::domain::cancel::poll;
 /// use mocban_core::raster::{Grid, enlarge};
 ///
 /// let step = Grid::from_fn(4, 1, |x, _| [if x < 2 { 10_000 } else { 30_000 }; 3]);
-/// let found = enlarge(&step, 2);
+/// let found = enlarge(&step.into(), 2);
 /// assert_eq!([found.width(), found.height()], [8, 2]);
 /// // Steeper than linear interpolation, which gives 15,000 and 25,000.
 /// let row: Vec<u16> = found.row(0).iter().map(|c| c[0]).collect();
 /// assert_eq!(row[3..5], [14_063, 25_938]);
 /// ```
-pub fn enlarge(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
-    if rgb.data().is_empty() {
-        return rgb.clone();
-    }
+pub fn enlarge(rgb: &Colours, times: u32) -> Grid<[u16; 3]> {
     let values = rgb.map(|colour| colour.map(f32::from));
+    if values.data().is_empty() {
+        return rgb.to_rgb16().into_owned();
+    }
     let [columns, rows] = [values.width(), values.height()].map(|side| Taps::all(side, times));
     let wide = Grid::from_fn(columns.len(), values.height(), |x, y| {
         columns[x].mix(|k| values.at(k, y))
@@ -41,36 +42,57 @@ pub fn enlarge(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
 /// use mocban_core::raster::{Grid, reduce};
 ///
 /// let ramp = Grid::from_fn(5, 2, |x, _| [100 * x as u16; 3]);
-/// let found = reduce(&ramp, 2);
+/// let found = reduce(&ramp.into(), 2);
 /// assert_eq!([found.width(), found.height()], [3, 1]);
 /// assert_eq!(found.data(), [[50; 3], [250; 3], [400; 3]]);
 /// ```
-pub fn reduce(rgb: &Grid<[u16; 3]>, times: u32) -> Grid<[u16; 3]> {
+pub fn reduce(rgb: &Colours, times: u32) -> Grid<[u16; 3]> {
+    match rgb {
+        Colours::Grey8(grid) => {
+            let means = square_means(grid, times, |level| [widen(level)]);
+            means.map(|[level]| [*level; 3])
+        }
+        Colours::Rgb8(grid) => square_means(grid, times, |colour| colour.map(widen)),
+        Colours::Rgb16(grid) => square_means(grid, times, |colour| colour),
+    }
+}
+
+/// Returns the means, rounded, of squares of `times` by `times` pixels. `levels` returns the levels of a pixel.
+fn square_means<T: Copy, const N: usize>(
+    grid: &Grid<T>,
+    times: u32,
+    levels: impl Fn(T) -> [u16; N],
+) -> Grid<[u16; N]> {
     let side = times.max(1) as usize;
-    let [columns, rows] = [rgb.width(), rgb.height()].map(|length| length.div_ceil(side));
-    let mut colours = Vec::with_capacity(columns * rows);
-    let mut sums = vec![[0_u64; 3]; columns];
-    for top in (0..rgb.height()).step_by(side) {
+    let [columns, rows] = [grid.width(), grid.height()].map(|length| length.div_ceil(side));
+    let mut means = Vec::with_capacity(columns * rows);
+    let mut sums = vec![[0_u64; N]; columns];
+    for top in (0..grid.height()).step_by(side) {
         poll();
-        sums.fill([0; 3]);
-        let rows = top..rgb.height().min(top + side);
+        sums.fill([0; N]);
+        let rows = top..grid.height().min(top + side);
         for y in rows.clone() {
-            for (sum, square) in sums.iter_mut().zip(rgb.row(y).chunks(side)) {
-                for colour in square {
-                    for (sum, value) in sum.iter_mut().zip(colour) {
-                        *sum += u64::from(*value);
+            for (sum, square) in sums.iter_mut().zip(grid.row(y).chunks(side)) {
+                // A row of a square has at most 65,536 pixels of the longest image that is read.
+                let mut row = [0_u32; N];
+                for pixel in square {
+                    for (sum, level) in row.iter_mut().zip(levels(*pixel)) {
+                        *sum += u32::from(level);
                     }
+                }
+                for (sum, row) in sum.iter_mut().zip(row) {
+                    *sum += u64::from(row);
                 }
             }
         }
-        colours.extend(sums.iter().enumerate().map(|(x, sum)| {
-            let width = side.min(rgb.width() - x * side);
+        means.extend(sums.iter().enumerate().map(|(x, sum)| {
+            let width = side.min(grid.width() - x * side);
             let pixels = (width * rows.len()) as u64;
             sum.map(|sum| ((sum + pixels / 2) / pixels) as u16)
         }));
     }
     // A square for each column and row.
-    Grid::from_vec(columns, rows, colours).expect("one colour for each square")
+    Grid::from_vec(columns, rows, means).expect("one colour for each square")
 }
 
 /// Returns the pixels of a print that are set in its mask: of an enlarged mask those of which at least half is set, of a
@@ -185,14 +207,27 @@ pub fn catmull_rom(t: f64) -> [f64; 4] {
 mod tests {
     use super::{enlarge, mask_of_print, reduce};
     use crate::domain::{MaskReduction, MaskScale};
-    use crate::raster::{Grid, Mask};
+    use crate::raster::{Colours, Grid, Mask};
     use std::num::NonZeroU32;
+
+    #[test]
+    fn all_forms_of_colours_have_the_same_means() {
+        for side in [5, 6, 7] {
+            let rgb8 = Grid::from_fn(side, 7, |x, y| [(40 * x) as u8, (3 * x * y) as u8, 7]);
+            let rgb16 = rgb8.map(|colour| colour.map(|level| u16::from(level) * 257));
+            let expected = reduce(&Colours::Rgb16(rgb16), 3);
+            assert_eq!(reduce(&Colours::Rgb8(rgb8.clone()), 3), expected);
+            let grey = rgb8.map(|colour| colour[1]);
+            let means = reduce(&Colours::Grey8(grey), 3);
+            assert_eq!(means, expected.map(|[_, green, _]| [*green; 3]));
+        }
+    }
 
     #[test]
     fn enlarged_ramps_are_ramps_in_the_frame_of_the_maps() {
         let ramp = Grid::from_fn(9, 7, |x, y| [1000 * x as u16, 3000 * y as u16, 500]);
         for times in [1, 2, 3, 5] {
-            let found = enlarge(&ramp, times);
+            let found = enlarge(&ramp.clone().into(), times);
             assert_eq!(
                 [found.width(), found.height()],
                 [9, 7].map(|side| side * times as usize)
@@ -216,7 +251,7 @@ mod tests {
     #[test]
     fn overshoot_stays_within_the_range_of_the_values() {
         let line = Grid::from_fn(8, 8, |x, _| [if x == 3 { 0 } else { u16::MAX }; 3]);
-        let found = enlarge(&line, 3);
+        let found = enlarge(&line.into(), 3);
         // Beside the dark line, the interpolation exceeds white.
         for x in [5, 6, 14, 15] {
             assert_eq!(found.at(x, 12)[0], u16::MAX, "{x}");
@@ -239,7 +274,7 @@ mod tests {
     fn a_mask_of_a_reduced_print_covers_its_strokes() {
         let is_ink = |x: usize, y: usize| (30..85).contains(&x) && x.abs_diff(y) < 14;
         let print = Grid::from_fn(119, 121, |x, y| [u16::from(!is_ink(x, y)) * 60_000; 3]);
-        let reduced = reduce(&print, 4);
+        let reduced = reduce(&print.into(), 4);
         assert_eq!([reduced.width(), reduced.height()], [30, 31]);
         let scale = MaskScale::Reduced(MaskReduction {
             times: NonZeroU32::new(4).expect("not zero"),

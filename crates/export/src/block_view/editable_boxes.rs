@@ -84,7 +84,8 @@ impl EditableBoxes {
             Arc::clone(&known.page)
         } else {
             let path = project.input(&page_path).path().to_owned();
-            Arc::new(SourcePrint::decoded(file, path, limits)?.picture.to_rgb8())
+            let page = SourcePrint::decoded(file, path, limits)?;
+            Arc::new(page.picture.rgb.into_rgb8())
         };
         let mut own = Self {
             name,

@@ -30,7 +30,7 @@ impl PagePicture {
         Ok(Self {
             hash,
             ink: PageInk::of(&image)?,
-            picture: image.to_rgb8(),
+            picture: image.rgb.into_rgb8(),
         })
     }
 }

@@ -76,7 +76,7 @@ impl SingleResultFormat for PlacedScanFormat {
         shown: ShownResult<'_>,
     ) -> Result<Vec<Vec<u8>>, PictureError> {
         let pictures = shown.pictures;
-        let print = pictures.source_print()?.picture.to_rgb8();
+        let print = pictures.source_print()?.picture.rgb.to_rgb8();
         let size = [print.width(), print.height()];
         let placement = pictures.placement(&shown.record.outcome, shown.scale, size)?;
         let title = ScanTitle {

@@ -126,7 +126,9 @@ mod tests {
             let found = decode(&print_png(&print), &ImageLimits::SUGGESTED).expect("reads");
             assert_eq!(
                 found.rgb,
-                print.map(|colour| colour.map(|c| u16::from(c) * 257))
+                print
+                    .map(|colour| colour.map(|c| u16::from(c) * 257))
+                    .into()
             );
         }
     }

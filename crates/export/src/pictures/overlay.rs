@@ -51,7 +51,7 @@ impl PrintView {
 
     /// Draws the print.
     pub fn print(&self, print: &PrintImage) -> Rgb {
-        resized(&print.to_rgb8(), self.width, self.height)
+        resized(&print.rgb.to_rgb8(), self.width, self.height)
     }
 
     /// Draws the depth map aligned to the print, lit from the upper left.
@@ -198,11 +198,7 @@ mod tests {
     }
 
     fn blank_print() -> PrintImage {
-        PrintImage {
-            rgb: Grid::new(30, 30, [60_000; 3]),
-            turned: None,
-            ignored_profile: None,
-        }
+        PrintImage::from(Grid::new(30, 30, [60_000; 3]))
     }
 
     #[test]

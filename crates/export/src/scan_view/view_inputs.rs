@@ -66,7 +66,7 @@ impl ViewInputs {
         scale: DepthScale,
     ) -> Result<Self, PictureError> {
         let picture = &pictures.source_print()?.picture;
-        let print = picture.to_rgb8();
+        let print = picture.rgb.to_rgb8();
         let size = [print.width(), print.height()];
         let placement = pictures.placement(outcome, scale, size)?;
         let strokes = pictures.mask_on_print(outcome)?;

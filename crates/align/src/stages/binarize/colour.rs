@@ -97,7 +97,7 @@ fn brightness() -> Vector3<f64> {
 
 /// Returns the colours along an axis, which points to or from the ink, minus those of the background.
 fn evened(picture: &PrintImage, known: &Mask, axis: &Vector3<f64>) -> Option<Grid<f32>> {
-    let along = picture.rgb.map(|rgb| axis.dot(&colour(*rgb)) as f32);
+    let along = picture.rgb.map(|rgb| axis.dot(&colour(rgb)) as f32);
     let threshold = otsu::split(&mut held_sample(&along, known))?.threshold;
     let low = along.map(|value| f64::from(*value) < threshold);
     // Ink is the smaller class.
@@ -117,11 +117,11 @@ fn colour(rgb: [u16; 3]) -> Vector3<f64> {
 }
 
 fn samples(picture: &PrintImage, known: &Mask) -> Vec<Vector3<f64>> {
-    sampled(&picture.rgb, known, SAMPLES, colour)
+    sampled(known, SAMPLES, |x, y| colour(picture.rgb.at(x, y)))
 }
 
 fn held_sample(grid: &Grid<f32>, known: &Mask) -> Vec<f32> {
-    sampled(grid, known, SAMPLES, |value| value)
+    sampled(known, SAMPLES, |x, y| grid.at(x, y))
 }
 
 /// Returns the standard deviation of the colours across the axis of the brightness.
@@ -224,11 +224,9 @@ mod tests {
             let grain = ((x * 7 + y * 13) % 11) as f64 - 5.0;
             ((c + grain) * (0.85 + 0.25 * x as f64 / SIDE as f64)).clamp(0.0, 255.0) as u16 * 257
         };
-        PrintImage {
-            rgb: Grid::from_fn(SIDE, SIDE, |x, y| colour(x, y).map(|c| value(x, y, c))),
-            turned: None,
-            ignored_profile: None,
-        }
+        PrintImage::from(Grid::from_fn(SIDE, SIDE, |x, y| {
+            colour(x, y).map(|c| value(x, y, c))
+        }))
     }
 
     #[test]

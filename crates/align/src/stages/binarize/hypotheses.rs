@@ -87,11 +87,9 @@ mod tests {
     use mocban_core::raster::{Grid, PrintImage};
 
     fn print(colour: impl Fn(usize, usize) -> [u16; 3]) -> PrintImage {
-        PrintImage {
-            rgb: Grid::from_fn(SIDE, SIDE, |x, y| colour(x, y).map(|c| c * 257)),
-            turned: None,
-            ignored_profile: None,
-        }
+        PrintImage::from(Grid::from_fn(SIDE, SIDE, |x, y| {
+            colour(x, y).map(|c| c * 257)
+        }))
     }
 
     #[test]

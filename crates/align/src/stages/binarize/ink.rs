@@ -106,7 +106,7 @@ pub(crate) struct InkMask {
 /// Returns the Rec. 601 luma, 0..=1.
 pub(super) fn grey_of(picture: &PrintImage) -> Grid<f32> {
     picture.rgb.map(|[r, g, b]| {
-        (0.299 * f32::from(*r) + 0.587 * f32::from(*g) + 0.114 * f32::from(*b)) / 65_535.0
+        (0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b)) / 65_535.0
     })
 }
 
@@ -228,7 +228,7 @@ pub(super) fn binarize_even(
 pub(super) fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture
         .rgb
-        .map(|[r, g, b]| f32::from(*r.min(g).min(b)) / 65_535.0 > WHITE);
+        .map(|[r, g, b]| f32::from(r.min(g).min(b)) / 65_535.0 > WHITE);
     let beyond = ConnectedComponents::label(&white).touching_border();
     let all = Mask::new(grey.width(), grey.height(), true);
     if beyond.density() < LEAST_WHITE {
@@ -304,11 +304,7 @@ mod tests {
     use mocban_core::raster::{Grid, PrintImage};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {
-        PrintImage {
-            rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
-            turned: None,
-            ignored_profile: None,
-        }
+        PrintImage::from(Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]))
     }
 
     fn read(picture: &PrintImage) -> Result<InkMask, BinarizeError> {
@@ -355,14 +351,12 @@ mod tests {
         let near = |at: usize, middle: i64| (at as i64 - middle).abs() < 6;
         let thin = |x, y| near(x, 100) || near(y, 90);
         let stain = |x: usize, y: usize| (x as f64 - 130.0).hypot(y as f64 - 120.0) < 22.0;
-        let print = |stain: &dyn Fn(usize, usize) -> bool| PrintImage {
-            rgb: Grid::from_fn(200, 200, |x, y| {
+        let print = |stain: &dyn Fn(usize, usize) -> bool| {
+            PrintImage::from(Grid::from_fn(200, 200, |x, y| {
                 let plain = if thin(x, y) { 90.0 } else { 215.0 };
                 let grey = plain * if stain(x, y) { 0.7 } else { 1.0 };
                 [grey as u16 * 257; 3]
-            }),
-            turned: None,
-            ignored_profile: None,
+            }))
         };
         let wrong = |ink: &InkMask| {
             let pixels = ink.mask.data().iter().enumerate();
@@ -404,11 +398,7 @@ mod tests {
                 "{grey}"
             );
         }
-        let one = PrintImage {
-            rgb: Grid::new(1, 1, [0; 3]),
-            turned: None,
-            ignored_profile: None,
-        };
+        let one = PrintImage::from(Grid::new(1, 1, [0; 3]));
         assert!(matches!(read(&one), Err(BinarizeError::NoContrast { .. })));
     }
 }

@@ -82,11 +82,7 @@ mod tests {
             let paper = 230 - x - y % 3;
             if bar(x) { paper / 4 } else { paper }
         };
-        let picture = PrintImage {
-            rgb: Grid::from_fn(120, 90, |x, y| [grey(x, y) as u16 * 257; 3]),
-            turned: None,
-            ignored_profile: None,
-        };
+        let picture = PrintImage::from(Grid::from_fn(120, 90, |x, y| [grey(x, y) as u16 * 257; 3]));
         let inks = hypotheses_within(&picture, &outline()).expect("ink");
         let inside = inside(&outline(), [120, 90]);
         assert!((2000..3000).contains(&inside.count()));

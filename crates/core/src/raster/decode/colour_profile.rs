@@ -5,7 +5,7 @@ use moxcms::{ColorProfile, DataColorSpace, Layout, ProfileText, ToneReprCurve, T
 use super::light_curve::srgb_level;
 use crate::domain::cancel::poll;
 use crate::domain::sanitize;
-use crate::raster::Grid;
+use crate::raster::{Colours, Grid};
 
 /// Largest difference of a colour from the same numbers in sRGB that is not worth a conversion: three levels of 255. The
 /// profiles that programs call sRGB differ by one or two.
@@ -27,7 +27,7 @@ impl FileProfile {
     ///
     /// # Errors
     /// Returns the name of a profile that cannot be read or applied, or is for colours of another kind.
-    pub(super) fn apply(&self, rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+    pub(super) fn apply(&self, rgb: &mut Colours) -> Result<(), String> {
         if self.is_of_inks {
             return Err(with_colours(&read(&self.bytes)?, &self.bytes));
         }
@@ -51,18 +51,18 @@ fn with_colours(profile: &ColorProfile, bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// Returns the name of a profile that cannot be read or applied, or is for colours of another kind than the image has.
-fn apply(bytes: &[u8], rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+fn apply(bytes: &[u8], rgb: &mut Colours) -> Result<(), String> {
     let profile = read(bytes)?;
-    let is_grey = |rgb: &Grid<[u16; 3]>| rgb.data().iter().all(|[r, g, b]| r == g && g == b);
     let layout = match profile.color_space {
         DataColorSpace::Rgb => Layout::Rgb,
-        DataColorSpace::Gray if is_grey(rgb) => Layout::Gray,
+        DataColorSpace::Gray if rgb.is_grey() => Layout::Gray,
         _ => return Err(with_colours(&profile, bytes)),
     };
     if is_nearly_srgb(&profile, layout) {
         return Ok(());
     }
-    convert(&profile, layout, rgb).ok_or_else(|| name(&profile))
+    let converted = rgb.change(|rgb| convert(&profile, layout, rgb));
+    converted.ok_or_else(|| name(&profile))
 }
 
 /// Returns whether colours hardly change. A profile of tables, and one that cannot be applied, is no such profile.
@@ -143,8 +143,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{FileProfile, apply};
-    use crate::raster::Grid;
     use crate::raster::test_profiles::TestProfile;
+    use crate::raster::{Colours, Grid};
 
     /// Returns inks and papers of all kinds.
     fn picture() -> Grid<[u16; 3]> {
@@ -173,10 +173,10 @@ mod tests {
         ] {
             let is_grey = [TestProfile::GREY, TestProfile::LINEAR_GREY].contains(&profile);
             let wanted = if is_grey { grey(&picture()) } else { picture() };
-            let mut image = profile.twin(&wanted);
-            let before = most_different(&image, &wanted);
+            let mut image = Colours::from(profile.twin(&wanted));
+            let before = most_different(&image.to_rgb16(), &wanted);
             assert_eq!(apply(&profile.icc(), &mut image), Ok(()));
-            let after = most_different(&image, &wanted);
+            let after = most_different(&image.to_rgb16(), &wanted);
             assert!(
                 before > 3000 && after < 400,
                 "{profile:?}: {before}, {after}"
@@ -187,9 +187,9 @@ mod tests {
     #[test]
     fn an_image_in_srgb_stays() {
         let srgb = moxcms::ColorProfile::new_srgb().encode().expect("encodes");
-        let mut image = picture();
+        let mut image = Colours::from(picture());
         assert_eq!(apply(&srgb, &mut image), Ok(()));
-        assert_eq!(image, picture());
+        assert_eq!(image, picture().into());
     }
 
     #[test]
@@ -205,9 +205,9 @@ mod tests {
             (of_space(b"XYZ "), "test, for XYZ colours"),
             (TestProfile::GREY.icc(), "test, for GRAY colours"),
         ] {
-            let mut image = picture();
+            let mut image = Colours::from(picture());
             assert_eq!(apply(&profile, &mut image), Err(named.to_owned()));
-            assert_eq!(image, picture());
+            assert_eq!(image, picture().into());
         }
     }
 
@@ -224,15 +224,15 @@ mod tests {
             (TestProfile::WIDE.icc(), "test, for RGB colours"),
             (Vec::new(), "an ICC profile that cannot be read"),
         ] {
-            let mut image = picture();
+            let mut image = Colours::from(picture());
             assert_eq!(of_inks(bytes).apply(&mut image), Err(named.to_owned()));
-            assert_eq!(image, picture());
+            assert_eq!(image, picture().into());
         }
     }
 
     #[test]
     fn a_profile_that_cannot_be_applied_is_named() {
-        let mut image = picture();
+        let mut image = Colours::from(picture());
         let named = apply(b"no profile", &mut image);
         assert_eq!(named, Err("an ICC profile that cannot be read".to_owned()));
         let mut without_curves = TestProfile::ADOBE.icc();
@@ -242,7 +242,7 @@ mod tests {
             }
         }
         assert_eq!(apply(&without_curves, &mut image), Err("test".to_owned()));
-        assert_eq!(image, picture());
+        assert_eq!(image, picture().into());
     }
 
     proptest! {
@@ -257,7 +257,7 @@ mod tests {
                 let at = at.index(bytes.len());
                 bytes[at] = value;
             }
-            let mut image = Grid::new(3, 2, [9999; 3]);
+            let mut image = Colours::from(Grid::new(3, 2, [9999; 3]));
             // Either the colours are converted, or the profile is named.
             let _ = apply(&bytes, &mut image);
         }

@@ -2,7 +2,7 @@
 
 use super::png_chunks::png_colour_chunk;
 use crate::domain::cancel::poll;
-use crate::raster::Grid;
+use crate::raster::Colours;
 
 /// The power of light that programs state for sRGB, and the largest difference from it that is not worth a conversion.
 const USUAL_GAMMA: f64 = 1.0 / 2.2;
@@ -46,7 +46,7 @@ impl LightCurve {
     ///
     /// # Errors
     /// Returns the name of what is not applied.
-    pub(super) fn apply(&self, rgb: &mut Grid<[u16; 3]>) -> Result<(), String> {
+    pub(super) fn apply(&self, rgb: &mut Colours) -> Result<(), String> {
         let levels: Vec<Vec<u16>> = match self {
             Self::Unread(name) => return Err(name.clone()),
             Self::Gamma(gamma) if (gamma - USUAL_GAMMA).abs() < GAMMA_TOLERANCE => return Ok(()),
@@ -60,15 +60,17 @@ impl LightCurve {
             }
         };
         let [red, green, blue] = [0, 1, 2].map(|colour| levels.get(colour).unwrap_or(&levels[0]));
-        let width = rgb.width();
-        for row in rgb.data_mut().chunks_exact_mut(width) {
-            poll();
-            for [r, g, b] in row {
-                *r = red[usize::from(*r)];
-                *g = green[usize::from(*g)];
-                *b = blue[usize::from(*b)];
+        rgb.change(|rgb| {
+            let width = rgb.width();
+            for row in rgb.data_mut().chunks_exact_mut(width) {
+                poll();
+                for [r, g, b] in row {
+                    *r = red[usize::from(*r)];
+                    *g = green[usize::from(*g)];
+                    *b = blue[usize::from(*b)];
+                }
             }
-        }
+        });
         Ok(())
     }
 }
@@ -110,7 +112,7 @@ pub(super) fn srgb_level(light: f64) -> f64 {
 mod tests {
     use super::{LightCurve, srgb_level};
     use crate::raster::test_images::encoded_chunk;
-    use crate::raster::{Grid, ImageLimits, PrintImage, decode, png_rgb8};
+    use crate::raster::{Colours, Grid, ImageLimits, PrintImage, decode, png_rgb8};
 
     /// Returns a PNG of one row with chunks before its pixels.
     fn png(levels: &[u8], chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
@@ -131,12 +133,12 @@ mod tests {
     }
 
     /// Returns the colours of the levels if light is the level to a power.
-    fn with_power(power: f64) -> Vec<[u16; 3]> {
-        let level = |level: &u8| {
-            let light = (f64::from(*level) / 255.0).powf(power);
+    fn with_power(power: f64) -> Colours {
+        let level = |at: usize, _| {
+            let light = (f64::from(LEVELS[at]) / 255.0).powf(power);
             [(srgb_level(light) * 65535.0).round() as u16; 3]
         };
-        LEVELS.iter().map(level).collect()
+        Grid::from_fn(LEVELS.len(), 1, level).into()
     }
 
     #[test]
@@ -144,10 +146,10 @@ mod tests {
         let plain = read(&[]);
         assert_eq!(plain.rgb.at(1, 0), [30 * 257; 3]);
         let linear = &100_000_u32.to_be_bytes()[..];
-        assert_eq!(read(&[(b"gAMA", linear)]).rgb.data(), with_power(1.0));
+        assert_eq!(read(&[(b"gAMA", linear)]).rgb, with_power(1.0));
         let mac = &55_556_u32.to_be_bytes()[..];
         let found = read(&[(b"gAMA", mac)]);
-        assert_eq!(found.rgb.data(), with_power(100_000.0 / 55_556.0));
+        assert_eq!(found.rgb, with_power(100_000.0 / 55_556.0));
         assert_eq!(found.ignored_profile, None);
         let usual = &45_455_u32.to_be_bytes()[..];
         for chunks in [
@@ -190,7 +192,7 @@ mod tests {
     #[test]
     fn code_points_are_applied_or_named() {
         let found = read(&[(b"cICP", &[1, 8, 0, 1][..])]);
-        assert_eq!(found.rgb.data(), with_power(1.0));
+        assert_eq!(found.rgb, with_power(1.0));
         for (points, name) in [
             ([9, 16, 0, 1], "cICP 9/16"),
             ([12, 13, 0, 1], "cICP 12/13"),
@@ -208,7 +210,7 @@ mod tests {
             let light = |at: u32| (f64::from(at) / 255.0).powf(power) * 65535.0;
             (0..256).map(|at| light(at).round() as u16).collect()
         };
-        let picture = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
+        let picture = Colours::from(Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]));
         let applied = |tables: Vec<Vec<u16>>| {
             let mut image = picture.clone();
             LightCurve::Tables(tables)

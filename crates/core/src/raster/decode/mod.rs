@@ -67,9 +67,9 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
                 pixels,
                 DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_)
             );
-            let mut rgb = colours_on_white(&pixels);
+            let mut rgb = colours_on_white(pixels);
             if has_16_bits {
-                widen_narrow(&mut rgb, false);
+                rgb.change(|rgb| widen_narrow(rgb, false));
             }
             let stated = StatedOrientation::of_png(bytes);
             let curve = LightCurve::of_png(bytes);
@@ -271,7 +271,10 @@ mod tests {
         };
         let one_bit = encode(png::BitDepth::One, None, &[0b0101_0000]);
         let picture = decode(&one_bit, &LIMITS).expect("decodes");
-        assert_eq!(picture.rgb.data(), [[0; 3], [65535; 3], [0; 3], [65535; 3]]);
+        assert_eq!(
+            picture.rgb.to_rgb16().data(),
+            [[0; 3], [65535; 3], [0; 3], [65535; 3]]
+        );
         let colours = [255, 0, 0, 0, 0, 255];
         let indexed = encode(png::BitDepth::Two, Some(&colours), &[0b0001_0001]);
         let picture = decode(&indexed, &LIMITS).expect("decodes");
@@ -381,7 +384,7 @@ mod tests {
                 bytes[at] = value;
             }
             if let Ok(picture) = decode(&bytes, &LIMITS) {
-                prop_assert!(picture.rgb.data().len() as u64 <= LIMITS.max_pixels);
+                prop_assert!((picture.rgb.width() * picture.rgb.height()) as u64 <= LIMITS.max_pixels);
             }
         }
     }

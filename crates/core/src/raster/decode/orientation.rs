@@ -4,7 +4,7 @@ use image::metadata::Orientation;
 
 use super::png_chunks::{png_chunks, png_text};
 use super::tags::TaggedFile;
-use crate::raster::Grid;
+use crate::raster::{Colours, Grid};
 
 /// Number of the tag in TIFF and EXIF.
 pub(super) const ORIENTATION: u64 = 274;
@@ -128,21 +128,29 @@ pub(super) fn swaps_sides(orientation: Orientation) -> bool {
     orientation.to_exif() >= 5
 }
 
-/// Returns the pixels of the upright image.
-pub(super) fn upright<T: Copy>(stored: Grid<T>, orientation: Orientation) -> Grid<T> {
+/// Returns the colours of the upright image.
+pub(super) fn upright(stored: Colours, orientation: Orientation) -> Colours {
+    match stored {
+        Colours::Grey8(stored) => Colours::Grey8(turned(stored, orientation)),
+        Colours::Rgb8(stored) => Colours::Rgb8(turned(stored, orientation)),
+        Colours::Rgb16(stored) => Colours::Rgb16(turned(stored, orientation)),
+    }
+}
+
+fn turned<T: Copy>(stored: Grid<T>, orientation: Orientation) -> Grid<T> {
     let (width, height) = (stored.width(), stored.height());
     let (right, bottom) = (width.saturating_sub(1), height.saturating_sub(1));
     let same = |pixel: &dyn Fn(usize, usize) -> T| Grid::from_fn(width, height, pixel);
-    let turned = |pixel: &dyn Fn(usize, usize) -> T| Grid::from_fn(height, width, pixel);
+    let swapped = |pixel: &dyn Fn(usize, usize) -> T| Grid::from_fn(height, width, pixel);
     match orientation {
         Orientation::NoTransforms => stored,
         Orientation::FlipHorizontal => same(&|x, y| stored.at(right - x, y)),
         Orientation::Rotate180 => same(&|x, y| stored.at(right - x, bottom - y)),
         Orientation::FlipVertical => same(&|x, y| stored.at(x, bottom - y)),
-        Orientation::Rotate90FlipH => turned(&|x, y| stored.at(y, x)),
-        Orientation::Rotate90 => turned(&|x, y| stored.at(y, bottom - x)),
-        Orientation::Rotate270FlipH => turned(&|x, y| stored.at(right - y, bottom - x)),
-        Orientation::Rotate270 => turned(&|x, y| stored.at(right - y, x)),
+        Orientation::Rotate90FlipH => swapped(&|x, y| stored.at(y, x)),
+        Orientation::Rotate90 => swapped(&|x, y| stored.at(y, bottom - x)),
+        Orientation::Rotate270FlipH => swapped(&|x, y| stored.at(right - y, bottom - x)),
+        Orientation::Rotate270 => swapped(&|x, y| stored.at(right - y, x)),
     }
 }
 
@@ -153,7 +161,7 @@ mod tests {
     use image::DynamicImage;
     use image::metadata::Orientation;
 
-    use super::{KEYWORDS, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, upright};
+    use super::{KEYWORDS, StatedOrientation, XMP_KEYWORD, XMP_PREFIX, of_tag, turned};
     use crate::raster::Grid;
     use crate::raster::test_images::encoded_chunk;
 
@@ -191,7 +199,7 @@ mod tests {
             let grey = image::GrayImage::from_raw(3, 2, stored.data().to_vec());
             let mut wanted = DynamicImage::ImageLuma8(grey.expect("six pixels"));
             wanted.apply_orientation(orientation);
-            let found = upright(stored, orientation);
+            let found = turned(stored, orientation);
             let size = (wanted.width() as usize, wanted.height() as usize);
             assert_eq!((found.width(), found.height()), size, "{number}");
             assert_eq!(found.data(), wanted.as_bytes(), "{number}");

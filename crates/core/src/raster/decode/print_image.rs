@@ -1,15 +1,15 @@
-//! The decoded print image: 16-bit RGB on white.
+//! The decoded print image: colours on white.
 
 use image::DynamicImage;
 
 use crate::domain::cancel::poll;
-use crate::raster::Grid;
+use crate::raster::{Colours, Grid};
 
-/// A print in 16-bit red, green and blue. Values of 8-bit files are multiplied by 257, so that white is always 65535.
+/// A print with what its file says about its colours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintImage {
     /// Colour of each pixel; a transparent pixel is white.
-    pub rgb: Grid<[u16; 3]>,
+    pub rgb: Colours,
     /// EXIF orientation of the file (2 to 8), if its pixels were turned to make the image upright.
     pub turned: Option<u8>,
     /// Name of the colour profile of the file, if it could not be applied.
@@ -33,6 +33,12 @@ pub fn profile_warning(profile: &str) -> String {
 
 impl From<Grid<[u16; 3]>> for PrintImage {
     fn from(rgb: Grid<[u16; 3]>) -> Self {
+        Colours::from(rgb).into()
+    }
+}
+
+impl From<Colours> for PrintImage {
+    fn from(rgb: Colours) -> Self {
         Self {
             rgb,
             turned: None,
@@ -51,48 +57,27 @@ pub(super) fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
 /// Rows that are converted between two polls for a cancellation.
 const BAND_ROWS: u32 = 16;
 
-/// Returns 16 bits for 8.
-pub(super) const fn widen(value: u8) -> u16 {
-    value as u16 * 257
-}
-
-/// Returns the colours of 8-bit samples, of which a pixel has one (grey) or three (RGB).
-pub(super) fn widened(
-    width: usize,
-    height: usize,
-    channels: usize,
-    samples: &[u8],
-) -> Grid<[u16; 3]> {
-    let mut colours = Vec::with_capacity(width * height);
-    for row in samples.chunks_exact(width * channels) {
-        poll();
-        if channels == 1 {
-            colours.extend(row.iter().map(|grey| [widen(*grey); 3]));
-        } else {
-            let pixels = row.as_chunks::<3>().0.iter();
-            colours.extend(pixels.map(|pixel| pixel.map(widen)));
-        }
-    }
-    // An image of w x h pixels has as many colours.
-    Grid::from_vec(width, height, colours).expect("one colour for each pixel")
-}
-
 /// Returns the colours of a decoded image, composited on white.
-pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
-    let (width, height) = (image.width() as usize, image.height() as usize);
+pub(super) fn colours_on_white(image: DynamicImage) -> Colours {
+    let size = [image.width() as usize, image.height() as usize];
+    let narrow = |channels, samples| {
+        let colours = Colours::of_samples(size, channels, samples);
+        colours.expect("as many samples as pixels")
+    };
     match image {
-        DynamicImage::ImageLuma8(image) => widened(width, height, 1, image),
-        DynamicImage::ImageRgb8(image) => widened(width, height, 3, image),
+        DynamicImage::ImageLuma8(image) => narrow(1, image.into_raw()),
+        DynamicImage::ImageRgb8(image) => narrow(3, image.into_raw()),
         // The cost of a copy does not matter for other kinds (16 bits, transparency), which are rare.
         other => {
-            let mut colours = Vec::with_capacity(width * height);
+            let mut colours = Vec::with_capacity(size[0] * size[1]);
             for top in (0..other.height()).step_by(BAND_ROWS as usize) {
                 poll();
                 let rows = BAND_ROWS.min(other.height() - top);
                 let band = other.crop_imm(0, top, other.width(), rows).to_rgba16();
                 colours.extend(band.pixels().map(|p| on_white(p.0)));
             }
-            Grid::from_vec(width, height, colours).expect("one colour for each pixel")
+            let colours = Grid::from_vec(size[0], size[1], colours);
+            colours.expect("one colour for each pixel").into()
         }
     }
 }

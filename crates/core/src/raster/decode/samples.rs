@@ -1,9 +1,10 @@
-//! Print images from samples in memory, and back to 8 bits.
+//! Print images from samples in memory.
 
-use super::print_image::{PrintImage, on_white, widen, widen_narrow};
+use super::print_image::{PrintImage, on_white, widen_narrow};
 use crate::domain::cancel::poll;
 use crate::page_vec::PageVec;
-use crate::raster::Grid;
+use crate::raster::colours::widen;
+use crate::raster::{Colours, Grid};
 
 /// Rows of a print image in memory: each pixel has one sample (grey), two (grey and alpha), three (RGB) or four (RGB and
 /// alpha).
@@ -13,14 +14,6 @@ pub enum SampleSlice<'a> {
     Eight(&'a [u8]),
     /// 16 bits; 65535 is white.
     Sixteen(&'a [u16]),
-}
-
-impl PrintImage {
-    /// Returns the colours rounded to 8 bits.
-    pub fn to_rgb8(&self) -> Grid<[u8; 3]> {
-        let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
-        self.rgb.map(|colour| colour.map(narrow))
-    }
 }
 
 /// A copy of the samples of an image, which becomes an image when it is needed.
@@ -46,7 +39,7 @@ impl PrintSamples {
     /// let samples = PrintSamples::copied([2, 1], 1, SampleSlice::Eight(&[0, 255])).ok_or("no image")?;
     /// let image = samples.to_image();
     /// assert_eq!(image.rgb.at(1, 0), [65535; 3]);
-    /// assert_eq!(image.to_rgb8().data(), [[0; 3], [255; 3]]);
+    /// assert_eq!(image.rgb.to_rgb8().data(), [[0; 3], [255; 3]]);
     /// # Ok::<(), &str>(())
     /// ```
     pub fn copied(size: [usize; 2], channels: usize, samples: SampleSlice<'_>) -> Option<Self> {
@@ -77,7 +70,14 @@ impl PrintSamples {
     /// Returns the image, as if the samples were read from a file. Transparent pixels are composited on white.
     pub fn to_image(&self) -> PrintImage {
         let [width, height] = self.size;
-        let mut rgb = Grid::new(width, height, [u16::MAX; 3]);
+        let narrow = |samples: &[u8]| {
+            let colours = Colours::of_samples(self.size, self.channels, samples.to_vec());
+            colours.expect("as many samples as pixels").into()
+        };
+        let mut rgb = match &self.samples {
+            SampleVec::Eight(samples) if self.channels % 2 == 1 => return narrow(samples),
+            _ => Grid::new(width, height, [u16::MAX; 3]),
+        };
         match &self.samples {
             SampleVec::Eight(samples) => widen_to(&mut rgb, samples, self.channels, widen),
             SampleVec::Sixteen(samples) => {
@@ -130,7 +130,7 @@ mod tests {
         let samples = rgb.data().as_flattened();
         let memory = PrintSamples::copied([5, 3], 3, Eight(samples)).expect("samples");
         assert_eq!(memory.to_image(), file);
-        assert_eq!(file.to_rgb8(), rgb);
+        assert_eq!(*file.rgb.to_rgb8(), rgb);
         for most in [900, 65_535] {
             let grey = Grid::from_fn(5, 3, |x, y| (most / 20 * (x + y)) as u16);
             let file = decode(&png_grey16(&grey), &ImageLimits::SUGGESTED).expect("decodes");
@@ -142,16 +142,17 @@ mod tests {
     #[test]
     fn sixteen_bits_convert_back_to_eight() {
         let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
-        let narrow = PrintImage::from(rgb).to_rgb8();
+        let image = PrintImage::from(rgb);
+        let narrow = image.rgb.to_rgb8();
         assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
     }
 
     #[test]
     fn transparent_samples_are_white_and_wrong_numbers_give_nothing() {
         let grey = PrintSamples::copied([2, 1], 2, Eight(&[0, 255, 0, 0])).expect("samples");
-        assert_eq!(grey.to_image().rgb.data(), [[0; 3], [65535; 3]]);
+        assert_eq!(grey.to_image().rgb.to_rgb16().data(), [[0; 3], [65535; 3]]);
         let rgba = PrintSamples::copied([1, 1], 4, Eight(&[9, 9, 9, 0])).expect("samples");
-        assert_eq!(rgba.to_image().rgb.data(), [[65535; 3]]);
+        assert_eq!(rgba.to_image().rgb.to_rgb16().data(), [[65535; 3]]);
         for (size, channels, count) in [
             ([2, 2], 1, 3),
             ([0, 2], 1, 0),

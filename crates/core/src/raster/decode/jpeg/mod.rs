@@ -12,16 +12,15 @@ use image::metadata::Orientation;
 use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::limits::ImageLimits;
-use super::print_image::widened;
 use crate::domain::FileKind;
 use crate::domain::cancel::run_aside;
-use crate::raster::Grid;
+use crate::raster::Colours;
 use interleaved::{JpegColours, JpegSamples, interleaved};
 use segments::{JpegFrame, JpegMetadata, JpegSegments};
 
 /// A decoded JPEG, as stored.
 pub(super) struct JpegImage {
-    pub(super) rgb: Grid<[u16; 3]>,
+    pub(super) rgb: Colours,
     pub(super) orientation: Orientation,
     pub(super) profile: Option<FileProfile>,
 }
@@ -38,7 +37,8 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<JpegImage, De
     limits.check_size(frame.width as u32, frame.height as u32)?;
     let image = samples(bytes, &segments, JpegColours::Usual)?;
     Ok(JpegImage {
-        rgb: widened(image.width, image.height, image.channels, &image.samples),
+        rgb: Colours::of_samples([image.width, image.height], image.channels, image.samples)
+            .ok_or_else(|| broken(FileKind::Jpeg, "the decoder returned too few samples"))?,
         orientation: segments.metadata.orientation.orientation(),
         profile: segments.profile().map(|bytes| FileProfile {
             bytes,

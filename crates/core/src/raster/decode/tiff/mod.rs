@@ -16,11 +16,11 @@ use super::colour_profile::FileProfile;
 use super::error::{DecodeError, broken};
 use super::light_curve::LightCurve;
 use super::limits::ImageLimits;
-use super::print_image::{on_white, widen, widen_narrow};
+use super::print_image::{on_white, widen_narrow};
 use super::tags::{TagSource, TagValues};
 use crate::domain::FileKind;
 use crate::domain::cancel::poll;
-use crate::raster::Grid;
+use crate::raster::{Colours, Grid};
 use chunks::DecodedChunk;
 use layout::TiffLayout;
 use pages::PrintPage;
@@ -31,7 +31,7 @@ const TRANSFER_FUNCTION: u64 = 301;
 
 /// The print of a TIFF file, as stored.
 pub(super) struct TiffImage {
-    pub(super) rgb: Grid<[u16; 3]>,
+    pub(super) rgb: Colours,
     /// EXIF orientation, if the file states one.
     pub(super) orientation: Option<u64>,
     pub(super) profile: Option<FileProfile>,
@@ -51,11 +51,20 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, De
     layout.find_compressed_padding(bytes)?;
     let is_of_inks = matches!(layout.photometric, Photometric::Cmyk);
     let has_16_bits = layout.used_bits == 16 && !layout.is_float;
-    let mut rgb = pixels(&layout, bytes)?;
-    if has_16_bits {
-        let is_inverted = layout.photometric == Photometric::WhiteIsZero;
-        widen_narrow(&mut rgb, is_inverted);
-    }
+    let is_inverted = layout.photometric == Photometric::WhiteIsZero;
+    let rgb = match layout.plain_channels() {
+        Some(1) => Colours::Grey8(plain_pixels(&layout, bytes, 0, |[level]| {
+            if is_inverted { !level } else { level }
+        })?),
+        Some(_) => Colours::Rgb8(plain_pixels(&layout, bytes, [0; 3], |colour| colour)?),
+        None => {
+            let mut rgb = pixels(&layout, bytes)?;
+            if has_16_bits {
+                widen_narrow(&mut rgb, is_inverted);
+            }
+            rgb.into()
+        }
+    };
     Ok(TiffImage {
         rgb,
         orientation: print.orientation(),
@@ -123,6 +132,30 @@ pub(super) fn stored_size(
     }
     let size = [layout.width, layout.height].map(|side| side as u32);
     Ok((size, print.orientation()))
+}
+
+/// Reads 8-bit grey or RGB. A pixel has `N` samples.
+fn plain_pixels<const N: usize, T: Copy>(
+    layout: &TiffLayout<'_>,
+    file: &[u8],
+    black: T,
+    pixel: impl Fn([u8; N]) -> T,
+) -> Result<Grid<T>, DecodeError> {
+    let [across, down] = layout.chunk_counts();
+    let mut out = Grid::new(layout.width, layout.height, black);
+    for at in 0..across * down {
+        let chunk = layout.decoded_chunk(file, at)?;
+        for y in 0..chunk.height {
+            poll();
+            let start = (chunk.top + y) * layout.width + chunk.left;
+            let target = &mut out.data_mut()[start..][..chunk.width];
+            let samples = layout.plain_bytes(&chunk, y).as_chunks::<N>().0;
+            for (target, samples) in target.iter_mut().zip(samples) {
+                *target = pixel(*samples);
+            }
+        }
+    }
+    Ok(out)
 }
 
 fn pixels(layout: &TiffLayout<'_>, file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {
@@ -204,10 +237,6 @@ fn convert(
         poll();
         let start = (chunk.top + y) * layout.width + chunk.left;
         let target = &mut out.data_mut()[start..][..chunk.width];
-        if let Some(bytes) = layout.plain_bytes(chunk, y) {
-            copy_bytes(&layout.photometric, bytes, target);
-            continue;
-        }
         layout.read_levels(chunk, y, full, &mut samples, &mut levels);
         let pixels = target.iter_mut().zip(levels.chunks_exact(pixel));
         match &layout.photometric {
@@ -248,27 +277,6 @@ fn composited([r, g, b]: [u16; 3], alpha: u16, is_premultiplied: bool) -> [u16; 
         [r, g, b].map(|c| c.saturating_add(u16::MAX - alpha))
     } else {
         on_white([r, g, b, alpha])
-    }
-}
-
-/// Converts rows of 8-bit grey or RGB.
-fn copy_bytes(photometric: &Photometric, bytes: &[u8], target: &mut [[u16; 3]]) {
-    match photometric {
-        Photometric::Rgb => {
-            for (bytes, target) in bytes.as_chunks::<3>().0.iter().zip(target) {
-                *target = bytes.map(widen);
-            }
-        }
-        Photometric::WhiteIsZero => {
-            for (byte, target) in bytes.iter().zip(target) {
-                *target = [widen(!byte); 3];
-            }
-        }
-        _ => {
-            for (byte, target) in bytes.iter().zip(target) {
-                *target = [widen(*byte); 3];
-            }
-        }
     }
 }
 

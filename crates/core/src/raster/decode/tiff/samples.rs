@@ -3,21 +3,23 @@
 use super::chunks::DecodedChunk;
 use super::layout::TiffLayout;
 use super::photometric::Photometric;
-use crate::raster::decode::print_image::widen;
+use crate::raster::colours::widen;
 
 impl TiffLayout<'_> {
-    /// Returns the bytes of a row of 8-bit grey or RGB without other samples, or `None` for other pixels.
-    pub(super) fn plain_bytes<'c>(
-        &self,
-        chunk: &'c DecodedChunk<'_>,
-        y: usize,
-    ) -> Option<&'c [u8]> {
+    /// Returns the samples of a pixel, 1 or 3, if all are 8-bit grey or RGB without other samples.
+    pub(super) fn plain_channels(&self) -> Option<usize> {
         let is_plain = match self.photometric {
             Photometric::WhiteIsZero | Photometric::BlackIsZero => self.samples == 1,
             Photometric::Rgb => self.samples == 3,
             _ => false,
         };
-        (is_plain && self.planes == 1 && self.bits == 8).then(|| self.row(chunk, 0, y))
+        let are_bytes = self.planes == 1 && self.bits == 8 && self.used_bits == 8;
+        (is_plain && are_bytes && !self.is_float).then_some(self.samples)
+    }
+
+    /// Returns the bytes of a row of an image with [`Self::plain_channels`].
+    pub(super) fn plain_bytes<'c>(&self, chunk: &'c DecodedChunk<'_>, y: usize) -> &'c [u8] {
+        self.row(chunk, 0, y)
     }
 
     /// Returns the bytes of a row in one plane.

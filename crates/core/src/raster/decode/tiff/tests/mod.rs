@@ -15,7 +15,7 @@ const RGB: u16 = 2;
 
 /// Decodes a file and returns its colours.
 fn colours(file: &[u8]) -> Result<Grid<[u16; 3]>, DecodeError> {
-    decode(file, &ImageLimits::SUGGESTED).map(|image| image.rgb)
+    decode(file, &ImageLimits::SUGGESTED).map(|image| image.rgb.to_rgb16().into_owned())
 }
 
 /// Returns the sentence for a page that is refused.

@@ -207,7 +207,7 @@ fn a_colour_profile_of_inks_is_named() {
         read.ignored_profile.as_deref(),
         Some("test, for CMYK colours")
     );
-    assert_eq!(read.rgb.data(), [[65535, 0, 52428], [13107; 3]]);
+    assert_eq!(read.rgb.to_rgb16().data(), [[65535, 0, 52428], [13107; 3]]);
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn a_transfer_function_is_applied_or_named() {
     // The level of sRGB of the light 100 / 255.
     let level = (1.055 * (100.0_f64 / 255.0).powf(1.0 / 2.4) - 0.055) * 65535.0;
     assert_eq!(
-        found.rgb.data(),
+        found.rgb.to_rgb16().data(),
         [[0; 3], [level.round() as u16; 3], [65535; 3]]
     );
     assert_eq!(found.ignored_profile, None);
