@@ -101,7 +101,7 @@ BEGIN
     END LOOP;
 END $$;
 
--- Checksums, by the number of their table (`ChecksummedTable` in `src/catalog/records/checksums.rs`): workers store those
+-- Checksums, by the number of their table (`ChecksummedTable` in `crates/catalog/src/db/checksummed_table.rs`): workers store those
 -- of pairs (0), true alignments (1), verdicts (2) and blocks (8), and change those of all but verdicts. Reviewers add those
 -- of the rows that they stored: a number belongs to one row, which never changes, so that an old state of its table can lack the
 -- row, but not show another reviewer.

@@ -383,7 +383,7 @@ CREATE TABLE block_character (
     PRIMARY KEY (block, label)
 ) STRICT;
 
--- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`. In a
+-- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `crates/catalog/src/db/checksummed_table.rs`. In a
 -- log, `previous` is the row before.
 CREATE TABLE checksum (
     record INTEGER NOT NULL,

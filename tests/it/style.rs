@@ -22,7 +22,7 @@ const ASSOCIATED_TYPES: &[&str] = &[
 ];
 
 /// Rooms whose public functions say in their first words what they do.
-const NUMERIC_MODULES: &[&str] = &["/stages/", "/mesh/", "/raster/", "report/stats"];
+const NUMERIC_MODULES: &[&str] = &["/stages/", "/mesh/", "/raster/", "results/src/stats"];
 
 /// Phrases that no documentation uses.
 const BANNED_PHRASES: &[&str] = &[

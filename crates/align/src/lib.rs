@@ -5,8 +5,9 @@
 //! - [`block`]: a whole carved face and the image of its page: height map, registration, characters, cut
 //! - [`scan_size`]: scans of an unexpected size, such as whole blocks or wrong units
 //!
-//! **Invariant:** each function returns the same bits for the same arguments, whatever the number of threads and the
-//! processor. Nothing here opens a file, reads a clock or remembers a call.
+//! **Invariant:** each function returns the same bits for the same arguments, whatever the number of threads. Nothing here
+//! opens a file, reads a clock or remembers a call. On another kind of processor, Fourier transforms are rounded
+//! differently.
 //!
 //! `fit` reads the print too, to decide which side of the mesh is carved: on 740 generated pairs, the relief alone decided
 //! it for 13 %, and other evidence for at most 2 % more. For the others, `fit` and `depth` would process both sides, with

@@ -5,6 +5,7 @@
 //! - [`view`]: one scan on its print in 3D, or a whole block with its page and control points
 //! - [`local_server`]: what all have in common: a server for the browser of one user, with its session, its guard
 //!   against other pages, connection limits and the frame of its pages
+//! - `messages`: sentences of the other crates in Vietnamese
 //!
 //! Every call fails if the catalog cannot be read. `# Errors` names other reasons.
 //!

@@ -13,12 +13,13 @@
 //!
 //! # A lost lease
 //! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
-//! and `OVERDUE` of `src/lease_recovery.rs`.
+//! and `OVERDUE` of `lease_recovery.rs`, and `DUE` of `queue/claim.rs`.
 //! ```text
 //!   ready ---- claim: queue/claim.rs ----> leased ---- ADVANCE of the last stage ----> done
 //!     ^                                      |
-//!     +---- RELEASE, SEND_BACK, FAIL --------+---- FAIL, or RECOVER after too many crashes ----> quarantined
+//!     +---- RELEASE, SEND_BACK --------------+---- FAIL, or RECOVER, OVERDUE after too many crashes ----> quarantined
 //!     +---- RECOVER, OVERDUE ----------------+
+//!     +---- DUE ---- backoff <---- FAIL -----+
 //! ```
 //!
 //! A write under a lease is stored if the worker has not ended, its last heartbeat was at most 50 s old when the write was
@@ -50,9 +51,10 @@
 //! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
 //!
 //! Read 18 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
-//! `checkpointer.rs`; in the catalog `src/worker_requests.rs`, `src/lease_recovery.rs`, `queue/kind.rs`, `queue/lease.rs`,
-//! `queue/claim.rs`, `queue/checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
-//! `queue/server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`.
+//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in its folder `queue` `kind.rs`, `lease.rs`,
+//! `claim.rs`, `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
+//! `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Others take leases away: the start of a run
+//! (`run.rs`), and in the catalog `jobs/requeue.rs` (`send_back`), `jobs/retired.rs`, `audit/repair.rs` and `blocks/cut.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`

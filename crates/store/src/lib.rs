@@ -3,7 +3,7 @@
 //! - [`Project`]: a project folder; [`Input`]: a mesh, print, page or label file at a path, below a named root or in an
 //!   object store
 //! - artifacts: files that stages compute, named by the hash of their content (`artifacts.rs`); in an object store, those
-//!   of a pair are packed into one object (`remote/pack.rs`), and cut meshes and prints are objects of their own
+//!   that are stored together are packed into one object (`packed.rs`), and cut meshes and prints are objects of their own
 //! - [`RunLock`] shows which processes work on a project; [`TargetLock`] which write an output
 //! - `owner.json` in a place of artifacts names the catalog that it belongs to (`place_owner.rs`)
 //! - `remote/`: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs` keeps copies of inputs, `listing.rs`

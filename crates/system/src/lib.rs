@@ -6,7 +6,8 @@
 //!
 //! Every call fails if the operating system refuses it. `# Errors` names other reasons.
 //!
-//! **Invariant:** other crates name an operating system only for the spelling of paths and to open the browser, and in `cfg` of Linux.
+//! **Invariant:** other crates name an operating system only for the spelling of paths, to open the browser, in `cfg` of
+//! Linux, and where they read `/proc`, which others do not have.
 
 pub mod failpoint;
 pub mod platform;
