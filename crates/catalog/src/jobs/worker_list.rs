@@ -13,6 +13,12 @@ SELECT w.id, w.host, w.pid, w.started, w.heartbeat, w.ended, w.died, w.metrics,
 FROM worker AS w WHERE w.heartbeat > ?1 AND (w.ended IS NULL OR w.metrics IS NOT NULL)
 ORDER BY w.id";
 
+/// Selects the worker that registered last.
+const LAST: &str = "
+SELECT w.id, w.host, w.pid, w.started, w.heartbeat, w.ended, w.died, w.metrics,
+    (SELECT count(*) FROM job AS j WHERE j.worker = w.id AND j.status = 1) AS leased
+FROM worker AS w ORDER BY w.id DESC LIMIT 1";
+
 /// A worker as stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkerRecord {
@@ -75,5 +81,11 @@ impl Catalog {
     pub async fn workers(&self, since: UnixMillis) -> Result<Vec<WorkerRecord>> {
         let mut conn = self.read_conn().await?;
         query_as(LIST).bind(since).fetch_all(&mut conn).await
+    }
+
+    /// Returns the worker that registered last, also if it ended without metrics. `None` if no run has begun.
+    pub async fn last_worker(&self) -> Result<Option<WorkerRecord>> {
+        let mut conn = self.read_conn().await?;
+        query_as(LAST).fetch_optional(&mut conn).await
     }
 }

@@ -92,6 +92,21 @@ async fn workers_before_a_time_and_workers_that_ended_without_metrics_are_not_li
     assert_eq!(since(0).await, [other]);
 }
 
+#[tokio::test]
+async fn the_worker_that_registered_last_is_known_also_after_its_end() {
+    let world = World::new(1).await;
+    let last = async || {
+        let last = world.catalog.last_worker().await.expect("a read");
+        last.map(|worker| (worker.id, worker.ended))
+    };
+    assert_eq!(last().await, Some((world.worker, None)));
+    let other = register(&world.catalog).await;
+    assert_eq!(last().await, Some((other, None)));
+    let ended = world.catalog.end_worker(other, 60, None).await;
+    ended.expect("ended");
+    assert_eq!(last().await, Some((other, Some(60))));
+}
+
 /// In PostgreSQL: a process changes counters of its own in each time interval.
 #[tokio::test]
 async fn heartbeats_add_up_the_counters_of_earlier_slots() {
