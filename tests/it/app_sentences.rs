@@ -337,6 +337,21 @@ fn a_run_that_fails_later_says_why_on_its_page() {
     let vietnamese = text(&page.get("/p/p/?language=vi"));
     let killed = "tiến trình bị buộc dừng (tín hiệu 9), có thể vì hết bộ nhớ. Hãy bấm Căn chỉnh để chạy tiếp.";
     assert!(vietnamese.contains(killed), "{vietnamese}");
+    // The list of projects leads there, also in an app that has not seen the end of the run.
+    let list = "Lần chạy trước không kết thúc tốt. <a href=\"./p/p/\">";
+    let home = text(&page.get("/"));
+    assert!(home.contains(list), "{home}");
+    drop(page);
+    let next = open_app(dir.path());
+    let seen = || ["/", "/p/p/"].map(|path| text(&next.get(path)));
+    let [home, run] = seen();
+    assert!(home.contains("The last run did not end well."), "{home}");
+    let why = "it was killed, or the computer stopped. Press Align to go on.";
+    assert!(run.contains(why), "{run}");
+    mocban(project.dir(), &["run"]).expect(0);
+    for html in seen() {
+        assert!(!html.contains("failed-run"), "{html}");
+    }
 }
 
 #[test]

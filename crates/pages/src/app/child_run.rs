@@ -25,7 +25,7 @@ const RECENT_MS: i64 = 3_600_000;
 const MESSAGE_BYTES: u64 = 4096;
 
 /// Starts `run` for a project with more arguments, for the pairs with these ids or for all. Returns once it works, or has
-/// ended at once without an error. The state keeps the reason of a later failure.
+/// ended at once without an error. The state keeps the reason of a failure.
 ///
 /// # Errors
 /// Returns the last message of a run that ended with an error at its beginning.
@@ -59,9 +59,13 @@ pub(super) async fn start(
         }
     });
     match tokio::time::timeout(WATCHED, &mut ends).await {
-        Ok(Ok(status)) => {
-            failure(status, messages).map_or(Ok(()), |why| Err(AppFailure::refused(why)))
-        }
+        Ok(Ok(status)) => match failure(status, messages) {
+            Some(why) => {
+                state.failed_runs.set(dir, Some(why.clone()));
+                Err(AppFailure::refused(why))
+            }
+            None => Ok(()),
+        },
         Ok(Err(_)) => Ok(()),
         Err(_) => {
             let (runs, dir) = (state.failed_runs.clone(), dir.to_owned());

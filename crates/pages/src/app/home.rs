@@ -33,6 +33,8 @@ struct Overview {
 struct ProjectState {
     counts: StatusCounts,
     is_running: bool,
+    /// Whether the last run did not end well.
+    has_failed_run: bool,
     failed_blocks: u64,
     /// Number of blocks that wait for a run.
     waiting_blocks: u64,
@@ -110,6 +112,7 @@ async fn read(state: &AppState, key: String) -> Overview {
                 other_files: counts.other_files + blocks.other_files(),
                 counts,
                 is_running: running,
+                has_failed_run: state.failed_runs.of(&open).await?.is_some(),
                 failed_blocks: failed_blocks(&blocks),
                 open_blocks: blocks.waiting() + blocks.leased() + outdated,
             })
@@ -156,6 +159,7 @@ fn card(visit: &Visit, project: &Overview) -> Markup {
                 Err(failure) => p.notice.bad { (failure.text(visit.language)) },
                 Ok(found) => {
                     (summary(visit, &found.counts, found.is_running))
+                    @if found.has_failed_run { (failed_run_part(visit, &href)) }
                     (waiting_part(visit, &href, found))
                     (failed_blocks_part(visit, &href, found.failed_blocks))
                     @if let Some(time) = project.last_change {
@@ -180,6 +184,17 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
         }
         progress value=(done + failed) max=(counts.pairs.max(1)) aria-label=(visit.t("Progress", "Tiến độ")) {}
         @if running { p.good { (visit.t("A run is in progress.", "Đang chạy.")) } }
+    }
+}
+
+/// Says that the last run of one did not end well. `base` is the relative address of the project, whose
+/// page says why.
+fn failed_run_part(visit: &Visit, base: &str) -> Markup {
+    html! {
+        p.notice.bad .failed-run {
+            (visit.t("The last run did not end well.", "Lần chạy trước không kết thúc tốt.")) " "
+            a href=(base) { (visit.t("See why", "Xem lý do")) }
+        }
     }
 }
 
@@ -252,6 +267,7 @@ mod tests {
             state: Ok(ProjectState {
                 counts: counts.clone(),
                 is_running: false,
+                has_failed_run: false,
                 failed_blocks: 0,
                 waiting_blocks,
                 waiting_verdicts,

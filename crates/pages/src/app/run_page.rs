@@ -32,8 +32,7 @@ pub(super) async fn page(
     visit: Visit,
 ) -> AppResult<Html<String>> {
     let open = state.open(&key).await?;
-    let failed = state.failed_runs.last(&open.dir);
-    let read = RunState::read(&open, failed).await;
+    let read = RunState::read(&open, &state.failed_runs).await;
     let run =
         read.map_err(|error: ProjectError| super::failure::AppFailure::of(error, &open.dir))?;
     let looked = visit.query.parsed::<UnixMillis>("looked");

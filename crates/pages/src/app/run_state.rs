@@ -2,13 +2,14 @@
 
 use super::child_run;
 use super::failed_groups::FailedGroup;
+use super::failed_runs::FailedRuns;
 use super::latest_results::LatestResults;
 use super::moved_blocks::changed_blocks;
 use super::projects::OpenProject;
 use super::run_blocks::outdated_blocks;
 use super::sentence::Sentence;
-use mocban_catalog::{Catalog, Plan, StatusCounts, WorkerRecord, WorkerState};
-use mocban_core::domain::{JobStatus, UnixMillis};
+use mocban_catalog::{Plan, StatusCounts, WorkerRecord, WorkerState};
+use mocban_core::domain::JobStatus;
 use mocban_project::ProjectResult;
 use mocban_project::block_status::BlockStatus;
 use mocban_project::location::now;
@@ -29,7 +30,7 @@ pub(super) struct RunState {
     pub(super) outdated_blocks: u64,
     /// Number of finished blocks whose moved files are known to have other content. 0 during a run.
     pub(super) changed_blocks: u64,
-    /// Why the last run that the app started ended, if it failed.
+    /// Why the last run did not end well, if it did not. `None` during a run.
     pub(super) failed_run: Option<Sentence>,
     /// Number of pairs at the same time, as the settings give it.
     pub(super) jobs: usize,
@@ -38,16 +39,8 @@ pub(super) struct RunState {
 }
 
 impl RunState {
-    pub(super) async fn read(
-        open: &OpenProject,
-        failed: Option<(UnixMillis, Sentence)>,
-    ) -> ProjectResult<Self> {
+    pub(super) async fn read(open: &OpenProject, failed_runs: &FailedRuns) -> ProjectResult<Self> {
         let (catalog, location) = (&open.catalog, open.location());
-        let failed_run = match failed {
-            // Another run, also in a terminal, has begun since.
-            Some((at, _)) if began_since(catalog, at).await? => None,
-            failed => failed.map(|(_, why)| why),
-        };
         let settings = location.settings()?;
         // Read before the counts: a run that ends in between leaves no leases.
         let running = is_running(&open.project, catalog, now()).await?;
@@ -81,7 +74,7 @@ impl RunState {
             blocks,
             outdated_blocks,
             changed_blocks,
-            failed_run,
+            failed_run: failed_runs.of(open).await?,
             jobs: options.workers,
             plan,
         })
@@ -148,10 +141,4 @@ impl RunState {
         let mut workers = self.workers.iter();
         self.is_running && workers.any(|worker| worker.state(now) == WorkerState::Stopping)
     }
-}
-
-/// Returns whether a run has begun since a time.
-async fn began_since(catalog: &Catalog, at: UnixMillis) -> ProjectResult<bool> {
-    let workers = catalog.workers(at).await?;
-    Ok(workers.iter().any(|worker| worker.started > at))
 }
