@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::address::encoded;
 use super::components::{action_form, grouped, stored_message};
-use super::remedies::{import_address, pair_remedy, unit_link};
+use super::remedies::{MendedPairs, import_address, pair_remedy, unit_link};
 use super::scan_correction::ScanQuestion;
 use super::visit::Visit;
 use mocban_catalog::{Catalog, PairFilter, PairOrder, PairResults, Result};
@@ -96,7 +96,7 @@ fn group_part(visit: &Visit, key: &str, group: &FailedGroup) -> Markup {
     html! {
         article.card {
             h3 { (grouped(group.number)) " · " (visit.class(class)) }
-            (pair_remedy(visit, key, class, &examples))
+            (pair_remedy(visit, key, class, group.number, &examples))
             ul.examples { @for pair in &group.examples { (example(visit, key, class, pair)) } }
             div.row {
                 a.button href={ "pairs?view=table&state=failed&class=" (class) } { (visit.t("Show them", "Xem các cặp này")) }
@@ -130,7 +130,7 @@ fn example(visit: &Visit, key: &str, class: FailureClass, pair: &PairResults) ->
             @if is_of_file && !is_cut(pair) {
                 p.row {
                     @if let Some(link) = unit_link(visit, "", pair) { (link) }
-                    a href=(import_address(visit, key, Some(name))) aria-label={ (replace) ": " (one_line(name)) } { (replace) }
+                    a href=(import_address(visit, key, Some(MendedPairs::Pair(name)))) aria-label={ (replace) ": " (one_line(name)) } { (replace) }
                 }
             }
         }

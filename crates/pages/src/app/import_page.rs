@@ -20,6 +20,7 @@ use super::import_columns::{KEPT_COLUMNS, columns_part};
 use super::import_matches::{with_change, without_change};
 use super::import_partners::{ImportPartners, mending_part};
 use super::import_preview::{changes_part, plan_part, warning};
+use super::mended_group::MendedGroup;
 use super::missing_names::no_project;
 use super::plan_cache::PlanCache;
 use super::project_places::ProjectPlaces;
@@ -30,7 +31,7 @@ use super::state::AppState;
 use super::upload_form::upload_part;
 use super::visit::Visit;
 use crate::on_thread::on_thread;
-use mocban_core::domain::{PairName, one_line};
+use mocban_core::domain::{FailureClass, PairName, one_line};
 use mocban_project::ProjectResult;
 use mocban_project::blocking::blocking;
 use mocban_project::import_blocks::{BlockSource, ListedItems, import_blocks};
@@ -95,15 +96,24 @@ pub(super) async fn page(
         _ => ColumnChanges::default(),
     };
     let mended = visit.query.parsed::<PairName>("mend");
-    if mended.is_some() && known.is_none() {
+    let class = visit.query.parsed::<FailureClass>("mend_class");
+    if (mended.is_some() || class.is_some()) && known.is_none() {
         return Err(no_project(&chosen.project, &state.options.folder));
     }
+    let group = match (class, &known) {
+        (Some(class), Some(known)) => {
+            let open = state.open_found(known.clone()).await?;
+            Some(MendedGroup::read(&open, class).await?)
+        }
+        _ => None,
+    };
     let body = html! {
         @if let Some(failure) = &refused { p.notice.bad role="alert" { (failure.text(visit.language)) } }
         @if visit.query.get("compare").is_some() {
             p.notice role="status" { (visit.t("Nothing was imported yet: look first at what this import changes in the project.", "Chưa nhập gì: trước hết hãy xem lần nhập này thay đổi những gì trong dự án.")) }
         }
         @if let Some(pair) = &mended { (mending_part(&visit, pair)) }
+        @if let Some(group) = &group { (group.part(&visit, &chosen.project)) }
         (chosen_part(&visit, &chosen))
         @if let Some(preview) = preview { (preview_part(&visit, &chosen, &preview, &changes)) }
         @if let Some(partners) = partners { (partners.part(&visit)) }

@@ -49,6 +49,7 @@ mod latest_results;
 mod linked_counts;
 mod looked_inputs;
 mod looked_part;
+mod mended_group;
 mod missing_names;
 mod moved_blocks;
 mod named_blocks;

@@ -13,7 +13,7 @@ use super::missing_names::no_pair;
 use super::pair_history::{history, verdict_line};
 use super::pair_numbers::numbers;
 use super::paper_method::{PAPER, is_comparable};
-use super::remedies::{failed_part, import_address, pair_remedy, unit_link};
+use super::remedies::{MendedPairs, failed_part, import_address, pair_remedy, unit_link};
 use super::retired_pairs::retired_band;
 use super::scan_correction::ScanQuestion;
 use super::sentence::Sentence;
@@ -163,7 +163,7 @@ fn state_line(visit: &Visit, key: &str, overview: &PairOverview) -> Markup {
                     p { (visit.t("If this unit is wrong, set another one. The pair is then computed again.", "Nếu đơn vị này sai, hãy đặt đơn vị khác. Sau đó cặp này được tính lại.")) }
                     p.row { (link) }
                 } @else {
-                    (pair_remedy(visit, key, stored.failure.class, &[results]))
+                    (pair_remedy(visit, key, stored.failure.class, 1, &[results]))
                 }
             }
         }
@@ -336,7 +336,7 @@ fn pair_actions(visit: &Visit, key: &str, detail: &PairDetail) -> Markup {
     html! {
         section.actions {
             @if failed {
-                a.button #mend href=(import_address(visit, key, Some(name))) {
+                a.button #mend href=(import_address(visit, key, Some(MendedPairs::Pair(name)))) {
                     (visit.t("Replace the scan or the print", "Thay bản quét hoặc bản in"))
                 }
             }

@@ -10,6 +10,15 @@ use super::visit::Visit;
 use mocban_catalog::{BlockAttributes, PairAttributes, PairResults};
 use mocban_core::domain::{BlockStage, FailureClass, NOT_THERE, Stage, one_line};
 
+/// The failed pairs of which an import shall replace files.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum MendedPairs<'p> {
+    /// The pair with this name.
+    Pair(&'p str),
+    /// All that failed with a class, except those that were cut from blocks.
+    Class(FailureClass),
+}
+
 /// Where the files of pairs or blocks were named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileOrigin {
@@ -64,11 +73,12 @@ impl FileOrigin {
     }
 }
 
-/// Returns what helps after failures of a class, of which some pairs are examples. `key` names the project.
+/// Returns what helps after `number` failures of a class, of which some pairs are examples. `key` names the project.
 pub(super) fn pair_remedy(
     visit: &Visit,
     key: &str,
     class: FailureClass,
+    number: u64,
     examples: &[&PairResults],
 ) -> Markup {
     let mut origins = examples
@@ -86,7 +96,10 @@ pub(super) fn pair_remedy(
     let all_missing = missing > 0 && missing == examples.len();
     // Pairs that were cut from a block are mended with it.
     let mended = examples.iter().find(|pair| pair.attributes.prior.is_none());
-    let mended = mended.map(|pair| pair.attributes.name.as_str());
+    let mended = mended.map(|pair| match number {
+        1 => MendedPairs::Pair(pair.attributes.name.as_str()),
+        _ => MendedPairs::Class(class),
+    });
     remedy(
         visit,
         &import_address(visit, key, mended),
@@ -97,11 +110,12 @@ pub(super) fn pair_remedy(
     )
 }
 
-/// Returns the address of the import into a project, which says how a file of a pair is replaced if one is given.
-pub(super) fn import_address(visit: &Visit, key: &str, mended: Option<&str>) -> String {
+/// Returns the address of the import into a project, which says how files of pairs are replaced if some are given.
+pub(super) fn import_address(visit: &Visit, key: &str, mended: Option<MendedPairs>) -> String {
     let address = format!("{}import?project={}", visit.root, encoded(key));
     match mended {
-        Some(pair) => format!("{address}&mend={}", encoded(pair)),
+        Some(MendedPairs::Pair(pair)) => format!("{address}&mend={}", encoded(pair)),
+        Some(MendedPairs::Class(class)) => format!("{address}&mend_class={class}"),
         None => address,
     }
 }
@@ -238,12 +252,25 @@ mod tests {
     fn an_import_for_failed_pairs_says_how_a_file_is_replaced() {
         let message = "1.png: the image is empty";
         let failed = fixtures::failed("chữ 1", FailureClass::BadInput, message);
+        let mut cut = failed.clone();
+        cut.attributes.prior = Some("{}".to_owned());
         let visit = Visit::in_language(Language::English);
-        for examples in [&[&failed][..], &[&failed, &failed]] {
-            let shown = pair_remedy(&visit, "a b", FailureClass::BadInput, examples);
+        for (number, examples, mended) in [
+            (1, &[&failed][..], Some("mend=ch%E1%BB%AF%201")),
+            (2, &[&failed, &failed], Some("mend_class=bad_input")),
+            (7, &[&cut, &failed], Some("mend_class=bad_input")),
+            (2, &[&cut, &cut], None),
+        ] {
+            let shown = pair_remedy(&visit, "a b", FailureClass::BadInput, number, examples);
             let shown = shown.into_string();
-            let link = "href=\"./import?project=a%20b&amp;mend=ch%E1%BB%AF%201\"";
-            assert!(shown.contains(link), "{shown}");
+            let links: Vec<&str> = shown.split("href=\"").skip(1).collect();
+            match mended {
+                Some(mended) => {
+                    let link = format!("./import?project=a%20b&amp;{mended}\"");
+                    assert!(links.len() == 1 && links[0].starts_with(&link), "{shown}");
+                }
+                None => assert!(links.is_empty(), "{shown}"),
+            }
         }
     }
 
