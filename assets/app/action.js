@@ -33,13 +33,12 @@ export function read(status, text) {
   return reply;
 }
 
-/** Sends an action. Its reply says which page follows. With `isLast`, it is sent even if the page is closed. */
-export async function act(address, fields, isLast = false) {
+/** Sends an action. Its reply says which page follows. */
+export async function act(address, fields) {
   const response = await fetch(address, {
     method: "POST",
     headers: { "content-type": "application/json", "x-csrf-token": token },
     body: JSON.stringify(fields),
-    keepalive: isLast,
   }).catch(() => {
     throw noAnswer();
   });

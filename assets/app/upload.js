@@ -83,7 +83,8 @@ async function follow(upload) {
 /** Returns why an upload was cut off. */
 async function reason(upload) {
   const reply = await fetch(`uploads/${upload.id}`, { headers: { accept: "application/json" } }).catch(() => null);
-  const text = (await reply?.json().catch(() => null))?.error;
+  if (!reply) return texts.gone;
+  const text = (await reply.json().catch(() => null))?.error;
   return text ?? texts.cut;
 }
 
@@ -232,10 +233,7 @@ cancel.addEventListener("click", async () => {
   upload.request?.abort();
 });
 
-// A page that is closed sends nothing more.
-window.addEventListener("pagehide", () => {
-  if (current) act("actions/upload-end", { upload: current.id, end: "cancel", project: "" }, true).catch(() => null);
-});
+// If the page is closed nevertheless, the connection is cut, and the files that have arrived are kept for the next page.
 window.addEventListener("beforeunload", (event) => {
   if (current) event.preventDefault();
 });

@@ -106,27 +106,67 @@ fn only_the_missing_files_are_sent_when_the_same_are_chosen_again() {
 }
 
 #[test]
-fn an_upload_says_that_the_app_was_stopped_and_the_next_app_takes_the_same_files() {
+fn an_upload_says_that_the_app_ended_and_the_next_app_takes_the_same_files() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    for (signal, said) in [
+        (Signal::TERM, "hoose them again"),
+        (Signal::KILL, "The program does not answer"),
+    ] {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let source = tempfile::tempdir().expect("a temporary directory");
+        let files = files(source.path());
+        let mut page = Page::of(app(dir.path()).args(["--lang", "en"]));
+        let (tab, home) = enter(&browser, &page, [1366, 660]);
+        open_import(&tab, &home);
+        send_slowly(&tab, &files);
+        kill_process(page.pid(), signal).expect("stopped");
+        page.exit_code();
+        tab.wait("!document.querySelector('#upload-problem').hidden");
+        let shown = tab.eval("document.querySelector('#upload-problem').textContent");
+        assert!(shown.to_string().contains(said), "{shown}");
+        let next = Page::of(app(dir.path()).args(["--lang", "en"]));
+        let (tab, home) = enter(&browser, &next, [1366, 660]);
+        // An app that is asked to stop removes what has arrived by itself.
+        if signal == Signal::KILL {
+            let shown = tab.eval("document.querySelector('#upload-last').textContent");
+            let said = "the program ended before the last upload was stored";
+            assert!(shown.to_string().contains(said), "{shown}");
+        }
+        open_import(&tab, &home);
+        tab.choose_files("#upload-files", &files);
+        tab.wait(STORED);
+        are_stored(dir.path(), &files);
+        tab.open(&home);
+        tab.wait("document.body?.dataset.ready && !document.querySelector('#upload-last')");
+    }
+}
+
+#[test]
+fn the_files_of_a_tab_that_was_closed_are_not_sent_again() {
     let Some(browser) = Browser::start() else {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let source = tempfile::tempdir().expect("a temporary directory");
     let files = files(source.path());
-    let mut page = Page::of(app(dir.path()).args(["--lang", "en"]));
-    let (tab, home) = enter(&browser, &page, [1366, 660]);
-    open_import(&tab, &home);
-    send_slowly(&tab, &files);
-    kill_process(page.pid(), Signal::TERM).expect("stopped");
-    page.exit_code();
-    tab.wait("!document.querySelector('#upload-problem').hidden");
-    let said = tab.eval("document.querySelector('#upload-problem').textContent");
-    assert!(said.to_string().contains("hoose them again"), "{said}");
-    let next = Page::of(app(dir.path()).args(["--lang", "en"]));
-    let (tab, home) = enter(&browser, &next, [1366, 660]);
-    open_import(&tab, &home);
-    tab.choose_files("#upload-files", &files);
-    tab.wait(STORED);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (first, home) = enter(&browser, &page, [1366, 660]);
+    open_import(&first, &home);
+    send_slowly(&first, &files);
+    first.open("about:blank");
+    let second = browser.tab(1366, 660);
+    wait_until("the page says that files are missing", || {
+        second.open(&format!("{home}import"));
+        second.wait(READY);
+        let last = second.eval("document.querySelector('#upload-last')?.textContent");
+        last.to_string().contains("2 of them have arrived")
+    });
+    second.eval(RECORD);
+    second.choose_files("#upload-files", &files);
+    second.wait(STORED);
+    assert_eq!(kept(&second, "sent"), json!(["2.stl"]));
     are_stored(dir.path(), &files);
 }
 

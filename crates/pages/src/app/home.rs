@@ -64,6 +64,9 @@ pub(super) async fn page(
             (visit.t("Folder", "Thư mục")) ": " (one_line(&shown.display().to_string()))
             @if let Some(free) = free { " · " (free_space(&visit, free)) }
         }
+        @if let Some(why) = state.uploads.left_over() {
+            p.notice.bad #upload-last { (visit.t("The last upload did not end well: ", "Lần gửi trước không thành công: ")) (why.text(visit.language)) ". " a href="import" { (visit.t("Import", "Nhập dữ liệu")) } }
+        }
         @if projects.is_empty() {
             (empty(visit.t("There is no project in this folder yet.", "Chưa có dự án nào trong thư mục này."), &html! {
                 p { a.button.primary href="import" { (visit.t("Import scans and prints", "Nhập bản quét và bản in")) } }

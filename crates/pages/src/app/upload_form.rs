@@ -35,6 +35,7 @@ pub(super) fn upload_part(visit: &Visit, uploads: &Uploads, project: &str) -> Ma
             data-storing=(visit.t("Storing", "Đang lưu"))
             data-cancelled=(visit.t("The upload was cancelled. Nothing of it was kept.", "Đã hủy. Không tệp nào được giữ lại."))
             data-cut=(visit.t("The program did not take all files. Choose them again.", "Chương trình không nhận hết các tệp. Hãy chọn lại."))
+            data-gone=(visit.t("The program does not answer, so it has not taken all files. Start it again, and choose them again on its page.", "Chương trình không trả lời nên chưa nhận hết các tệp. Hãy mở lại chương trình rồi chọn lại các tệp trên trang của nó."))
             data-arrived=(visit.t("Files that had arrived before and are not sent again", "Số tệp đã đến nơi từ trước và không phải gửi lại"))
             data-nothing=(visit.t("None of the files is a scan, an image, a list or a ZIP.", "Không có tệp nào là bản quét, hình ảnh, danh sách hay ZIP."))
         {

@@ -174,8 +174,13 @@ impl Uploads {
         let open = locked(&self.open);
         let last = open.values().rfind(|upload| upload.is_for(project));
         let problem = last.and_then(|upload| upload.problem());
-        let is_first = open.is_empty() && self.next.load(Ordering::Relaxed) == 1;
-        problem.or_else(|| (self.has_left_over && is_first).then(left_over))
+        problem.or_else(|| self.left_over())
+    }
+
+    /// Says that an earlier process left an upload, until the next one begins.
+    pub(super) fn left_over(&self) -> Option<Sentence> {
+        let is_first = self.next.load(Ordering::Relaxed) == 1;
+        (self.has_left_over && is_first).then(left_over)
     }
 }
 
