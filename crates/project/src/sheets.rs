@@ -138,7 +138,7 @@ pub async fn block_sheet(
         } else {
             view.draw_boxes()
         };
-        (sheet_png(&picture), view.characters.len())
+        (sheet_png(&picture), view.block.characters.len())
     };
     let drawn = blocking(draw).await;
     drop(work);

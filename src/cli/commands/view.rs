@@ -14,7 +14,7 @@ use mocban_core::domain::{BlockName, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::review::Language;
-use mocban_pages::view::{BlockAccess, open_block, scan_page};
+use mocban_pages::view::{BlockAccess, PictureReading, open_block, scan_page};
 use mocban_project::blocking::blocking;
 use mocban_project::selection;
 use mocban_project::verdict_words;
@@ -95,7 +95,9 @@ async fn block_page(
     let store = BlockAccess::new(&context.location, name, next, Arc::default());
     let limits = context.location.settings()?.config.limits;
     let language = args.language();
-    let opened = open_block(catalog, project, name, args.metric, limits, store, language).await?;
+    let shown = (name, args.metric);
+    let reading = PictureReading::First;
+    let opened = open_block(catalog, project, shown, limits, store, language, reading).await?;
     if let Some(why) = opened.refused {
         context.warn(&format!("block {name} is not aligned: {why}"));
         context.info("choose the same places on the relief and on the page to align them");

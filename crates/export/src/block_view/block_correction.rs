@@ -139,7 +139,7 @@ impl BlockCorrection {
         let page_path = &detail.state.attributes.page_path;
         Ok(Self {
             faces: faces.collect::<Result<_, BlockViewError>>()?,
-            page: PagePicture::read(project, page_path, None, limits)?,
+            page: PagePicture::read(project, page_path, limits)?,
             mesh_hash: mesh.map_err(invalid)?,
             saved: detail.state.control_points.clone(),
             aligned,

@@ -26,6 +26,7 @@ impl BlockView {
             .layers
             .draw(PageLayer::Page, whole, whole.scaled(scale));
         let boxes: Vec<MarkedBox> = self
+            .block
             .characters
             .iter()
             .map(|one| marked(one, scale))
@@ -33,7 +34,7 @@ impl BlockView {
         mark(&mut picture, &boxes);
         with_legend(
             &picture,
-            &boxes_legend(self.name.as_str(), &self.characters),
+            &boxes_legend(self.block.name.as_str(), &self.block.characters),
         )
     }
 
@@ -44,9 +45,9 @@ impl BlockView {
         let picture = self
             .layers
             .draw(PageLayer::Overlay, whole, whole.scaled(scale));
-        let share = format_number(100.0 * self.agreement, Percent);
+        let share = format_number(100.0 * self.block.agreement, Percent);
         let legend = PictureLegend {
-            title: format!("{}: {share} % of the places agree", self.name),
+            title: format!("{}: {share} % of the places agree", self.block.name),
             entries: vec![
                 (BOTH, "ink and stroke of the relief"),
                 (VERMILLION, "stroke without ink"),

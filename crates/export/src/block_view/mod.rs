@@ -20,5 +20,6 @@ pub use characters::{CharacterStatus, CharacterView};
 pub use chosen_files::replaced_file;
 pub use editable_boxes::EditableBoxes;
 pub use page_layers::{PageLayer, PageLayers, PageRegion};
-pub use page_view::BlockView;
+pub use page_picture::DecodedPage;
+pub use page_view::{AlignedBlock, BlockView};
 pub(super) use registered_face::RegisteredFace;

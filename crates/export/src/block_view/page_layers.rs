@@ -1,5 +1,7 @@
 //! Draws parts of a page: its image, the relief of the block in the frame of the page, or both over each other.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::pictures::{BLUE, Rgb, VERMILLION, resized, shaded};
@@ -81,7 +83,7 @@ impl PageRegion {
 /// The image of a page, its ink, and the face that was registered with it.
 #[derive(Debug)]
 pub struct PageLayers {
-    pub(super) page: Rgb,
+    pub(super) page: Arc<Rgb>,
     pub(super) ink: PageInk,
     pub(super) face: CarvedFace,
     pub(super) map: PageMap,
@@ -106,7 +108,7 @@ impl PageLayers {
     /// Draws a layer of a region, which must lie within the page, as a picture of `size` pixels.
     pub fn draw(&self, layer: PageLayer, region: PageRegion, size: [usize; 2]) -> Rgb {
         match layer {
-            PageLayer::Page => self.page_part(region, size),
+            PageLayer::Page => page_part(&self.page, region, size),
             PageLayer::Relief => relief(&self.face, &self.map, region, size),
             PageLayer::Overlay => overlay(&self.ink, &self.face, &self.map, region, size),
         }
@@ -118,17 +120,18 @@ impl PageLayers {
         let picture = self.draw(layer, region, region.picture_size(longest));
         jpeg(&picture)
     }
+}
 
-    fn page_part(&self, region: PageRegion, [width, height]: [usize; 2]) -> Rgb {
-        if region == self.whole() {
-            return resized(&self.page, width, height);
-        }
-        let [x, y] = region.corner;
-        let part = Rgb::from_fn(region.size[0], region.size[1], |column, row| {
-            self.page.at(x + column, y + row)
-        });
-        resized(&part, width, height)
+/// Draws a region of the image of a page, in which it must lie, as a picture of `width` x `height` pixels.
+pub(super) fn page_part(page: &Rgb, region: PageRegion, [width, height]: [usize; 2]) -> Rgb {
+    if region == PageRegion::whole([page.width(), page.height()]) {
+        return resized(page, width, height);
     }
+    let [x, y] = region.corner;
+    let part = Rgb::from_fn(region.size[0], region.size[1], |column, row| {
+        page.at(x + column, y + row)
+    });
+    resized(&part, width, height)
 }
 
 /// Encodes a picture as JPEG.
@@ -267,6 +270,8 @@ impl FacePlaces {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use std::sync::Arc;
+
     use super::{BOTH, INK_BESIDE, PageLayer, PageLayers, PageRegion};
     use crate::pictures::{BLUE, Rgb, VERMILLION};
     use mocban_align::block::{
@@ -296,7 +301,9 @@ pub(super) mod tests {
         let page_from_face = Affine2::scale_shift(10.0, [0.0, 0.0]);
         let soft = Grid::from_fn(1000, 600, |x, _| if INK.contains(&x) { 255 } else { 0 });
         PageLayers {
-            page: Rgb::from_fn(1000, 600, |x, y| [(x % 250) as u8, (y % 250) as u8, 7]),
+            page: Arc::new(Rgb::from_fn(1000, 600, |x, y| {
+                [(x % 250) as u8, (y % 250) as u8, 7]
+            })),
             ink: PageInk::of_soft(soft),
             face,
             map: PageMap::affine(&page_from_face, [0.0, 0.0], [90.0, 60.0]),

@@ -1,45 +1,83 @@
 //! Reads a block with its results, so that it can be shown.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
-use super::page_picture::PagePicture;
+use super::page_picture::DecodedPage;
 use super::registered_face::{RegisteredFace, stored_block};
 use crate::pair_pictures::PictureError;
 use crate::scan_view::ScanView;
 use mocban_catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
 use mocban_core::InputLimits;
 use mocban_core::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
-use mocban_core::raster::ImageLimits;
 use mocban_store::Project;
 
-/// A block that is aligned with its page, and the results of its characters.
+/// A block that is aligned with its page, and the results of its characters, as the catalog knows them. Its pictures are read
+/// apart, because that takes longer.
 #[derive(Debug)]
-pub struct BlockView {
+pub struct AlignedBlock {
     /// The user's id.
     pub name: BlockName,
-    /// The page, and the relief in its frame.
-    pub layers: PageLayers,
     /// The characters that have a box.
     pub characters: Vec<CharacterView>,
     /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
+    registered: RegisteredFace,
+    page_path: String,
     pairs: Vec<Option<PairResults>>,
     metric: Option<ThresholdMetric>,
     limits: InputLimits,
     project: Project,
 }
 
+/// A block that is aligned with its page, its pictures, and the results of its characters.
+#[derive(Debug)]
+pub struct BlockView {
+    /// The block with its characters.
+    pub block: AlignedBlock,
+    /// The page, and the relief in its frame.
+    pub layers: PageLayers,
+}
+
 impl BlockView {
-    /// Reads a block with the results of a metric, or of the default one if `metric` is `None`.
+    /// Reads a block with the results of a metric, or of the default one if `metric` is `None`, and its pictures.
+    ///
+    /// # Errors
+    /// Returns the errors of [`AlignedBlock::read`] and [`Self::of`].
+    pub async fn read(
+        catalog: &Catalog,
+        project: &Project,
+        name: &BlockName,
+        metric: Option<ThresholdMetric>,
+        limits: InputLimits,
+    ) -> Result<Self, BlockViewError> {
+        Self::of(AlignedBlock::read(catalog, project, name, metric, limits).await?).await
+    }
+
+    /// Reads the pictures of a block.
+    ///
+    /// # Errors
+    /// Returns the errors of [`AlignedBlock::read_page`] and [`AlignedBlock::read_layers`].
+    pub async fn of(block: AlignedBlock) -> Result<Self, BlockViewError> {
+        let read = move || {
+            let layers = block.read_layers(&block.read_page()?)?;
+            Ok(Self { block, layers })
+        };
+        tokio::task::spawn_blocking(read).await?
+    }
+}
+
+impl AlignedBlock {
+    /// Reads a block with the results of a metric, or of the default one if `metric` is `None`. Reads only the catalog.
     ///
     /// # Errors
     /// Returns an error if the block is not aligned with its page, if no character has a result of the metric that was asked
-    /// for, or if the catalog, the page or the heights cannot be read.
+    /// for, or if the catalog cannot be read.
     pub async fn read(
         catalog: &Catalog,
         project: &Project,
@@ -67,14 +105,12 @@ impl BlockView {
         let characters = shown
             .map(|(stored, pair)| CharacterView::new(stored, pair.as_ref(), metric))
             .collect();
-        let agreement = registered.agreement;
-        let (page_path, own) = (detail.state.attributes.page_path, project.clone());
-        let read = move || read_layers(&registered, &page_path, &own, &limits.image);
         Ok(Self {
             name: name.clone(),
-            layers: tokio::task::spawn_blocking(read).await??,
             characters,
-            agreement,
+            agreement: registered.agreement,
+            registered,
+            page_path: detail.state.attributes.page_path,
             pairs,
             metric,
             limits,
@@ -82,11 +118,44 @@ impl BlockView {
         })
     }
 
-    /// Returns what the page in the browser shows: the size of the page and the characters, as JSON.
-    pub fn to_json(&self) -> Value {
+    /// Returns whether the files of the pictures are there, in folders of this computer. Does not read them.
+    pub fn has_files(&self) -> bool {
+        let page = self.project.input(&self.page_path);
+        page.path().is_file() && self.registered.has_height_file(&self.project)
+    }
+
+    /// Reads the image of the page. Waits for the disk.
+    ///
+    /// # Errors
+    /// Returns an error if the page cannot be read or is not the one that was aligned.
+    pub fn read_page(&self) -> Result<DecodedPage, BlockViewError> {
+        let (path, aligned) = (&self.page_path, self.registered.page_hash);
+        DecodedPage::read(&self.project, path, aligned, &self.limits.image)
+    }
+
+    /// Finds the ink of the page and reads the heights of the face. Waits for the disk. A page gives its ink once; later calls
+    /// decode it again.
+    ///
+    /// # Errors
+    /// Returns an error if the page has no ink, or if the heights cannot be read.
+    pub fn read_layers(&self, page: &DecodedPage) -> Result<PageLayers, BlockViewError> {
+        let ink = match page.take_ink() {
+            Some(ink) => ink?,
+            None => self.read_page()?.take_ink().expect("it was just decoded")?,
+        };
+        Ok(PageLayers {
+            page: Arc::clone(&page.picture),
+            ink,
+            face: self.registered.read_face(&self.project)?,
+            map: self.registered.map()?,
+        })
+    }
+
+    /// Returns what the page in the browser shows: the size of the page in pixels and the characters, as JSON.
+    pub fn to_json(&self, page_size: [usize; 2]) -> Value {
         json!({
             "block": self.name,
-            "page_size": self.layers.size(),
+            "page_size": page_size,
             "agreement": self.agreement,
             "characters": self.characters,
         })
@@ -121,22 +190,6 @@ async fn pairs_of(
         .map(|pair| (pair.attributes.name.clone(), pair))
         .collect();
     Ok(names.map(|name| by_name.remove(&name?)).collect())
-}
-
-/// Reads the page and the heights of a block.
-fn read_layers(
-    registered: &RegisteredFace,
-    page_path: &str,
-    project: &Project,
-    limits: &ImageLimits,
-) -> Result<PageLayers, BlockViewError> {
-    let page = PagePicture::read(project, page_path, registered.page_hash, limits)?;
-    Ok(PageLayers {
-        page: page.picture,
-        ink: page.ink,
-        face: registered.read_face(project)?,
-        map: registered.map()?,
-    })
 }
 
 /// Returns the error of a block without alignment, with its failure or what to do.

@@ -94,6 +94,12 @@ impl RegisteredFace {
         (self.map.columns, &self.map.nodes_px)
     }
 
+    /// Returns whether the heights are in a file that is there, and not in an object store.
+    pub(super) fn has_height_file(&self, project: &Project) -> bool {
+        let heights = self.files.get(&heights_role(self.face.side));
+        heights.is_some_and(|heights| project.artifact_path(heights).is_file())
+    }
+
     /// Reads the heights of the face, and computes its relief.
     ///
     /// # Errors

@@ -25,7 +25,7 @@ use super::state::AppState;
 use super::visit::Visit;
 use crate::local_server::AccessControl;
 use crate::on_thread::read_on_thread;
-use crate::view::{BlockAccess, open_block};
+use crate::view::{BlockAccess, PictureReading, open_block};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, FailureClass, JobStatus, one_line,
@@ -121,12 +121,12 @@ async fn opened(state: &AppState, open: &Arc<OpenProject>, block: &str) -> AppRe
         open_block(
             &own.catalog,
             &own.project,
-            &name,
-            None,
+            (&name, None),
             limits,
             store,
             // The app adds the chosen language to the address of each page.
             None,
+            PictureReading::Meanwhile,
         )
         .await
     });

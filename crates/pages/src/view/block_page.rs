@@ -1,6 +1,6 @@
 //! The page of a block: its layers as images, its characters, and the 3D views of their pairs.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use axum::Router;
 use axum::body::Bytes;
@@ -13,13 +13,12 @@ use super::block_access::BlockAccess;
 use super::boxes_page;
 use super::correction_page;
 use super::page;
-use super::refusal::refused;
-use super::scan_page::jpeg;
+use super::refusal::{refused, unavailable};
+use super::shown_block::ShownBlock;
 use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
-use crate::local_server::WorkThread;
 use crate::review::Language;
 use mocban_core::domain::BlockName;
-use mocban_export::block_view::{BlockView, PageLayer, PageRegion};
+use mocban_export::block_view::{PageLayer, PageRegion};
 
 /// The assets of this page.
 const ASSETS: [EmbeddedAsset; 10] = [
@@ -34,32 +33,19 @@ const ASSETS: [EmbeddedAsset; 10] = [
     embedded_asset!("block-view", "block-camera.js", SCRIPT),
     embedded_asset!("block-view", "block-view.css", STYLE),
 ];
-/// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
-/// part and so never have fewer pixels.
-const LONGEST_SIDE: usize = 3000;
-
-/// The block of a page, with the images of whole layers that were asked for.
-#[derive(Debug)]
-struct ShownBlock {
-    view: BlockView,
-    language: Option<Language>,
-    back: Option<&'static str>,
-    work: Arc<WorkThread>,
-    overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
-}
 
 /// Returns the routes of the page of a block, of its correction and of its boxes. Without `view`, the correction is shown
 /// first. A language in the address of a page, as in `?lang=vi`, is preferred to `language`; without both, the browser
 /// decides.
 pub(super) fn block_page(
     block: &BlockName,
-    view: Option<BlockView>,
+    view: Option<Arc<ShownBlock>>,
     store: BlockAccess,
     language: Option<Language>,
 ) -> Router {
     let work = store.work();
     let pages = match view {
-        Some(view) => page_routes(view, language, store.back(), Arc::clone(&work)),
+        Some(view) => page_routes(view, language, store.back()),
         None => Router::new().route("/", get(async || Redirect::to("correct"))),
     };
     pages
@@ -78,93 +64,87 @@ pub(super) fn block_page(
         ))
 }
 
-/// Returns the routes of the page of a block that is aligned.
-fn page_routes(
-    view: BlockView,
+/// What the routes of the page of an aligned block share.
+#[derive(Debug, Clone)]
+struct BlockPageState {
+    shown: Arc<ShownBlock>,
     language: Option<Language>,
     back: Option<&'static str>,
-    work: Arc<WorkThread>,
+}
+
+/// Returns the routes of the page of a block that is aligned.
+fn page_routes(
+    shown: Arc<ShownBlock>,
+    language: Option<Language>,
+    back: Option<&'static str>,
 ) -> Router {
-    let shown = ShownBlock {
-        view,
-        language,
-        back,
-        work,
-        overviews: PageLayer::ALL.map(|_| OnceLock::new()),
-    };
     Router::new()
         .route("/", get(index))
         .route("/block.json", get(block_json))
         .route("/layer/{layer}", get(overview))
         .route("/region/{layer}/{x}/{y}/{width}/{height}", get(region))
         .route("/scan/{index}", get(scan))
-        .with_state(Arc::new(shown))
+        .with_state(BlockPageState {
+            shown,
+            language,
+            back,
+        })
 }
 
-impl ShownBlock {
-    /// Returns the image of a whole layer, which is drawn once.
-    fn overview(&self, layer: PageLayer) -> Bytes {
-        let stored = PageLayer::ALL.iter().zip(&self.overviews);
-        let mut of_layer = stored.filter(|(one, _)| **one == layer);
-        let draw = || self.picture(layer, self.view.layers.whole(), LONGEST_SIDE);
-        match of_layer.next() {
-            Some((_, stored)) => stored.get_or_init(draw).clone(),
-            None => draw(),
-        }
-    }
-
-    /// Draws a region of a layer as JPEG.
-    fn picture(&self, layer: PageLayer, region: PageRegion, longest: usize) -> Bytes {
-        self.view.layers.jpeg(layer, region, longest).into()
-    }
-}
-
-async fn index(State(shown): State<Arc<ShownBlock>>, RawQuery(query): RawQuery) -> Html<String> {
-    let language = Language::asked_for(query.as_deref()).or(shown.language);
-    Html(page::block(shown.view.name.as_str(), language, shown.back))
+async fn index(State(state): State<BlockPageState>, RawQuery(query): RawQuery) -> Html<String> {
+    let language = Language::asked_for(query.as_deref()).or(state.language);
+    let name = state.shown.block.name.as_str();
+    Html(page::block(name, language, state.back))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
     embedded::asset(&ASSETS, &name)
 }
 
-async fn block_json(State(shown): State<Arc<ShownBlock>>) -> Response {
-    let kind = [(header::CONTENT_TYPE, "application/json")];
-    (kind, shown.view.to_json().to_string()).into_response()
+async fn block_json(State(state): State<BlockPageState>) -> Response {
+    match state.shown.page().await {
+        Ok(page) => {
+            let kind = [(header::CONTENT_TYPE, "application/json")];
+            let shown = state.shown.block.to_json(page.size());
+            (kind, shown.to_string()).into_response()
+        }
+        Err(why) => unavailable(&why),
+    }
 }
 
-async fn overview(State(shown): State<Arc<ShownBlock>>, Path(layer): Path<String>) -> Response {
-    let Ok(layer) = layer.parse::<PageLayer>() else {
-        return StatusCode::NOT_FOUND.into_response();
-    };
-    let work = Arc::clone(&shown.work);
-    jpeg(&work, move || Some(shown.overview(layer))).await
+async fn overview(State(state): State<BlockPageState>, Path(layer): Path<String>) -> Response {
+    match layer.parse::<PageLayer>() {
+        Ok(layer) => picture(state.shown.overview(layer).await),
+        Err(_) => StatusCode::NOT_FOUND.into_response(),
+    }
 }
 
 async fn region(
-    State(shown): State<Arc<ShownBlock>>,
+    State(state): State<BlockPageState>,
     Path((layer, x, y, width, height)): Path<(String, usize, usize, usize, usize)>,
 ) -> Response {
     let region = PageRegion {
         corner: [x, y],
         size: [width, height],
     };
-    let part = region.within(shown.view.layers.size());
-    match (layer.parse::<PageLayer>(), part) {
-        (Ok(layer), Some(part)) => {
-            let work = Arc::clone(&shown.work);
-            jpeg(&work, move || {
-                Some(shown.picture(layer, part, LONGEST_SIDE))
-            })
-            .await
-        }
-        _ => StatusCode::NOT_FOUND.into_response(),
+    match layer.parse::<PageLayer>() {
+        Ok(layer) => picture(state.shown.region(layer, region).await),
+        Err(_) => StatusCode::NOT_FOUND.into_response(),
     }
 }
 
-async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) -> Response {
-    let work = Arc::clone(&shown.work);
-    let read = work.call(move || shown.view.scan(index));
+/// Responds with a picture, or that there is none, or why it cannot be drawn.
+fn picture(drawn: Result<Option<Bytes>, String>) -> Response {
+    match drawn {
+        Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
+        Ok(None) => StatusCode::NOT_FOUND.into_response(),
+        Err(why) => unavailable(&why),
+    }
+}
+
+async fn scan(State(state): State<BlockPageState>, Path(index): Path<usize>) -> Response {
+    let shown = Arc::clone(&state.shown);
+    let read = state.shown.work.call(move || shown.block.scan(index));
     let failed = |why: String| refused(StatusCode::INTERNAL_SERVER_ERROR, &why);
     match read.await {
         Ok(Ok(Some(bytes))) => {

@@ -11,8 +11,9 @@ pub(crate) mod page;
 mod read_once;
 mod refusal;
 mod scan_page;
+mod shown_block;
 
 pub use block_access::BlockAccess;
-pub use opened_block::{OpenedBlock, open_block};
+pub use opened_block::{OpenedBlock, PictureReading, open_block};
 pub(crate) use scan_page::asset as scan_asset;
 pub use scan_page::scan_page;

@@ -48,24 +48,34 @@ pub(crate) fn view(pair: &str, language: Option<Language>, back: Option<&str>) -
 
 /// Returns the page of a block, with a link to `back`. Its script loads the data and creates the controls.
 pub(super) fn block(name: &str, language: Option<Language>, back: Option<&str>) -> String {
-    block_page(name, language, back, "assets/block-view.js")
+    // The script asks for this picture only when it knows the characters.
+    let first = html! { link rel="preload" as="image" href="layer/page"; };
+    block_page(name, language, back, "assets/block-view.js", &first)
 }
 
 /// Returns the page on which the alignment of a block is corrected, with a link to `back`.
 pub(super) fn correction(name: &str, language: Option<Language>, back: Option<&str>) -> String {
-    block_page(name, language, back, "assets/block-correct.js")
+    block_page(name, language, back, "assets/block-correct.js", &html! {})
 }
 
 /// Returns the page on which the boxes of a block are changed, with a link to `back`.
 pub(super) fn boxes(name: &str, language: Option<Language>, back: Option<&str>) -> String {
-    block_page(name, language, back, "assets/block-boxes.js")
+    block_page(name, language, back, "assets/block-boxes.js", &html! {})
 }
 
-fn block_page(name: &str, language: Option<Language>, back: Option<&str>, script: &str) -> String {
+/// Returns a page of a block whose head also has `more`.
+fn block_page(
+    name: &str,
+    language: Option<Language>,
+    back: Option<&str>,
+    script: &str,
+    more: &Markup,
+) -> String {
     let head = html! {
         (chosen(language))
         link rel="stylesheet" href="assets/scan-viewer.css";
         link rel="stylesheet" href="assets/block-view.css";
+        (more)
         script type="module" src=(script) {}
     };
     let body = html! {

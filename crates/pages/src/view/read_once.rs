@@ -15,6 +15,11 @@ impl<T> Default for ReadOnce<T> {
 }
 
 impl<T> ReadOnce<T> {
+    /// Keeps what was read.
+    pub(super) fn of(read: T) -> Self {
+        Self(Mutex::new(Some(Arc::new(read))))
+    }
+
     /// Returns what is kept, if it was read.
     pub(super) async fn known(&self) -> Option<Arc<T>> {
         self.0.lock().await.clone()
