@@ -180,7 +180,7 @@ pub(super) fn pair_card(
     html! {
         a.pair-card href={ (path) (shown.text()) } {
             img src={ (path) "picture/thumb-" (metric) } alt="" loading="lazy" width="180" height="180";
-            span.name { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
+            span.name title=(one_line(name)) { (one_line(name)) @if let Some(character) = &pair.attributes.character { " " span.character { (one_line(character)) } } }
             @match outcome {
                 Some(outcome) => span.muted.warn[is_low] {
                     (visit.t("confidence", "độ tin cậy")) " " (score(visit, outcome.confidence))

@@ -157,7 +157,9 @@ fn settle_link(visit: &Visit, text: &CountedText) -> Markup {
         .with("metric", metric);
     html! {
         @if !metrics.is_empty() {
-            " " a href={ "review" (settle.text()) } { (visit.t("Settle the disagreements", "Giải quyết bất đồng")) }
+            // With several metrics, it follows their links.
+            (if metrics.len() > 1 { " · " } else { " " })
+            a href={ "review" (settle.text()) } { (visit.t("Settle the disagreements", "Giải quyết bất đồng")) }
         }
     }
 }
