@@ -15,7 +15,7 @@ use mocban_core::domain::{BlockStage, FailureClass, NOT_THERE, Stage, one_line};
 pub(super) enum MendedPairs<'p> {
     /// The pair with this name.
     Pair(&'p str),
-    /// All that failed with a class, except those that were cut from blocks.
+    /// All pairs that failed with a class, without pairs that were cut from blocks.
     Class(FailureClass),
 }
 
