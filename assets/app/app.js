@@ -1,6 +1,7 @@
 // Actions, and parts of pages that are read again while they are shown.
 
 import { act, showProblem } from "./action.js";
+import { forgetTyped, showAgain } from "./typed.js";
 
 const offline = document.getElementById("offline");
 
@@ -49,6 +50,8 @@ document.addEventListener("click", (event) => {
   link.href = to;
 });
 
+document.querySelector("header a[hreflang]")?.addEventListener("click", showAgain);
+
 document.addEventListener("submit", async (event) => {
   const form = event.target;
   if (!form.dataset.post) return;
@@ -64,6 +67,7 @@ document.addEventListener("submit", async (event) => {
     const pairs = kept && { pairs: JSON.parse(sessionStorage.getItem(kept) ?? "[]") };
     const reply = await act(form.dataset.post, { ...fields(form, event.submitter), ...pairs });
     if (kept) for (const name of [kept, `${kept}:open`]) sessionStorage.removeItem(name);
+    if (reply.go) forgetTyped(form);
     if (reply.go) location.assign(reply.go);
     else if (reply.reload) await refresh(true);
   } catch (error) {
@@ -145,7 +149,9 @@ async function refresh(mustReload) {
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
   // The language was changed on another page.
   if (page.documentElement.lang !== document.documentElement.lang) {
-    if (!document.activeElement?.matches("input:not([readonly]), select, textarea")) location.reload();
+    if (document.activeElement?.matches("input:not([readonly]), select, textarea")) return;
+    showAgain();
+    location.reload();
     return;
   }
   const fresh = page.querySelector("[data-live]");

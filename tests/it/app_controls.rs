@@ -20,7 +20,7 @@ const SMALLEST: u32 = 44;
 pub(crate) const SHOWN: &str = "document.body?.dataset.ready && !document.querySelector('#choice:not([data-ready])') && [...document.querySelectorAll('[data-load]')].every((part) => part.dataset.loaded)";
 
 /// Pages of the app.
-pub(crate) const PAGES: [&str; 22] = [
+pub(crate) const PAGES: [&str; 23] = [
     "",
     "p/p/",
     "p/p/pairs",
@@ -39,6 +39,7 @@ pub(crate) const PAGES: [&str; 22] = [
     "p/p/export",
     "import",
     "import?project=p&mend=broken",
+    "import?project=p&mend_class=bad_input",
     "restore",
     "p/p/settings?key=run.workers&value=3",
     "p/p/health",

@@ -3,7 +3,8 @@
 use serde_json::json;
 
 use crate::app::{act, app, html, open_app, text, with_project};
-use crate::app_browser::enter;
+use crate::app_browser::{enter, on_page};
+use crate::app_controls::SHOWN;
 use crate::block_view::finished_block;
 use crate::browser::Browser;
 use crate::page::{Page, read_project};
@@ -72,4 +73,37 @@ fn a_page_that_moves_is_read_again_in_the_language_chosen_in_another_tab() {
     // As another tab does.
     tab.eval(&format!("fetch('{home}?language=vi'), null"));
     tab.wait(&in_language("vi"));
+}
+
+#[test]
+fn what_was_typed_stays_on_the_way_back_and_in_the_other_language() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    let typed = |language: &str| {
+        format!(
+            "{SHOWN} && document.documentElement.lang === '{language}' && document.querySelector('#reviewer')?.value === 'lan'"
+        )
+    };
+    tab.open(&format!("{home}p/p/review"));
+    tab.wait(SHOWN);
+    tab.click("#reviewer", false);
+    tab.text("lan");
+    tab.click("header a[hreflang]", false);
+    tab.wait(&typed("vi"));
+    tab.click("nav a[href$='/blocks']", false);
+    tab.wait(&on_page("/blocks"));
+    tab.eval("history.back(), null");
+    tab.wait(&typed("vi"));
+    // A link to the page shows it as it is made.
+    tab.click("nav a[href$='/blocks']", false);
+    tab.wait(&on_page("/blocks"));
+    tab.click("nav a[href$='/review']", false);
+    tab.wait(&on_page("/review"));
+    tab.wait("document.readyState === 'complete'");
+    assert_eq!(tab.eval("document.querySelector('#reviewer').value"), "");
 }

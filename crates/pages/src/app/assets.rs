@@ -5,7 +5,7 @@ use axum::response::Response;
 
 use crate::embedded::{self, EmbeddedAsset, SCRIPT, STYLE, embedded_asset};
 
-const ASSETS: [EmbeddedAsset; 9] = [
+const ASSETS: [EmbeddedAsset; 10] = [
     embedded_asset!("app", "tokens.css", STYLE),
     embedded_asset!("app", "app.css", STYLE),
     embedded_asset!("app", "action.js", SCRIPT),
@@ -14,6 +14,7 @@ const ASSETS: [EmbeddedAsset; 9] = [
     embedded_asset!("app", "columns.js", SCRIPT),
     embedded_asset!("app", "import-files.js", SCRIPT),
     embedded_asset!("app", "pair.js", SCRIPT),
+    embedded_asset!("app", "typed.js", SCRIPT),
     embedded_asset!("app", "upload.js", SCRIPT),
 ];
 

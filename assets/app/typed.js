@@ -1,0 +1,57 @@
+// Keeps what was typed in forms for the way back to a page, and for the same page in the other language.
+
+const KEPT = `typed ${location.pathname}`;
+/** Names the page that is shown again at once, with what was typed. */
+const AGAIN = "shown again";
+const FIELDS = "form :is(input:not([type=hidden], [type=file], [type=checkbox], [type=radio], [readonly]), select, textarea)";
+
+/** Returns the fields of forms that were not sent, by the name of the form and their own. */
+function fields() {
+  const named = [...document.querySelectorAll(FIELDS)].filter((field) => field.name && !("sent" in field.form.dataset));
+  return named.map((field) => [`${field.form.dataset.post ?? field.form.getAttribute("action")} ${field.name}`, field]);
+}
+
+/** Returns the value that a field had when the page was made. */
+function made(field) {
+  if (!field.matches("select")) return field.defaultValue;
+  const options = [...field.options];
+  return (options.find((option) => option.defaultSelected) ?? options[0])?.value ?? "";
+}
+
+/** Says that a form has been sent, so that what was typed in it is not kept. */
+export function forgetTyped(form) {
+  form.dataset.sent = "";
+}
+
+/** Says that this page is shown again, so that what was typed stays. */
+export function showAgain() {
+  sessionStorage.setItem(AGAIN, location.pathname);
+}
+
+function keep() {
+  const typed = fields().filter(([, field]) => field.value !== made(field));
+  if (typed.length > 0) sessionStorage.setItem(KEPT, JSON.stringify(typed.map(([name, field]) => [name, field.value])));
+  else sessionStorage.removeItem(KEPT);
+}
+
+function restore() {
+  const [navigation] = performance.getEntriesByType("navigation");
+  const isAgain = sessionStorage.getItem(AGAIN) === location.pathname;
+  sessionStorage.removeItem(AGAIN);
+  const kept = new Map(JSON.parse(sessionStorage.getItem(KEPT) ?? "[]"));
+  sessionStorage.removeItem(KEPT);
+  if (!isAgain && navigation?.type !== "back_forward") return;
+  for (const [name, field] of fields()) {
+    const value = kept.get(name);
+    const isKnown = value !== undefined && (!field.matches("select") || [...field.options].some((option) => option.value === value));
+    // The browser may have filled it in itself.
+    if (!isKnown || field.value !== made(field)) continue;
+    field.value = value;
+    for (const event of ["input", "change"]) field.dispatchEvent(new Event(event, { bubbles: true }));
+  }
+}
+
+// The scripts of the page then listen to changes.
+if (document.readyState === "complete") restore();
+else window.addEventListener("load", restore);
+window.addEventListener("pagehide", keep);
