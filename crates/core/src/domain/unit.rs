@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::spelling::{plain_form, quoted};
 use super::{any_case, enum_names};
 
 /// Unit of a mesh's coordinates. If the unit is unknown, no lengths in mm are reported.
@@ -23,19 +24,106 @@ enum_names! { pub LengthUnit, "a unit":
     Mm = "mm", Cm = "cm", M = "m", In = "in",
 }
 
+/// Letters of the longest name whose blanks and hyphens count.
+const SHORT_NAME: usize = 4;
+/// Long names of units in plain form, in the languages of those who scan woodblocks. Other names are in [`MICROMETRES`].
+const LONG_NAMES: [(LengthUnit, &[&str]); 4] = [
+    (
+        LengthUnit::Mm,
+        &[
+            "millimeter",
+            "millimeters",
+            "millimetre",
+            "millimetres",
+            "milimeter",
+            "milimeters",
+            "milimetre",
+            "milimetres",
+            "milimetro",
+            "milimetros",
+            "milimet",
+            "毫米",
+            "㎜",
+        ],
+    ),
+    (
+        LengthUnit::Cm,
+        &[
+            "centimeter",
+            "centimeters",
+            "centimetre",
+            "centimetres",
+            "centimetro",
+            "centimetros",
+            "zentimeter",
+            "centimet",
+            "xentimet",
+            "xangtimet",
+            "厘米",
+            "㎝",
+        ],
+    ),
+    (
+        LengthUnit::M,
+        &[
+            "meter", "meters", "metre", "metres", "metro", "metros", "met", "米",
+        ],
+    ),
+    (
+        LengthUnit::In,
+        &[
+            "inch", "inches", "zoll", "pouce", "pouces", "pulgada", "pulgadas", "英寸", "\"", "″",
+        ],
+    ),
+];
+
+/// Names of thousandths of a millimetre, which no unit is.
+const MICROMETRES: [&str; 17] = [
+    "um",
+    "µm",
+    "μm",
+    "㎛",
+    "µ",
+    "μ",
+    "micron",
+    "microns",
+    "micrometer",
+    "micrometers",
+    "micrometre",
+    "micrometres",
+    "mikrometer",
+    "mikrometre",
+    "micromet",
+    "mikromet",
+    "微米",
+];
+
 impl LengthUnit {
-    /// Parses a short or a long name, such as `mm` and `millimeters`. Upper and lower case are equal.
+    /// Parses a short or a long name, such as `mm` and `millimeters`, which may be in brackets or end in a full stop. Upper and
+    /// lower case are equal.
     ///
     /// # Errors
-    /// Returns an error that shows the name as it was typed.
+    /// Returns an error that shows the name as it was typed. Micrometres have their own.
     pub fn named(text: &str) -> Result<Self, String> {
-        match text.trim().to_lowercase().as_str() {
-            "millimeter" | "millimeters" | "millimetre" | "millimetres" => Ok(Self::Mm),
-            "centimeter" | "centimeters" | "centimetre" | "centimetres" => Ok(Self::Cm),
-            "meter" | "meters" | "metre" | "metres" => Ok(Self::M),
-            "inch" | "inches" => Ok(Self::In),
-            _ => any_case(text),
+        let name = bare_name(text);
+        let long = long_form(name);
+        let mut units = LONG_NAMES.into_iter();
+        let of_long = units.find(|(_, names)| names.contains(&&*long));
+        if let Some((unit, _)) = of_long {
+            return Ok(unit);
         }
+        if is_micrometres(&long) {
+            let typed = quoted(text.trim());
+            return Err(format!(
+                "micrometres ({typed}) are not read; divide the coordinates by 1000 and use mm"
+            ));
+        }
+        any_case(name).or_else(|_: String| any_case(text))
+    }
+
+    /// Returns whether a text is the name of a unit, also of micrometres, which are not read.
+    pub fn is_name(text: &str) -> bool {
+        Self::named(text).is_ok() || is_micrometres(&long_form(bare_name(text)))
     }
 
     /// Returns the length of one unit in millimetres.
@@ -57,6 +145,31 @@ impl LengthUnit {
     }
 }
 
+/// Returns a name without brackets around it and without full stops at its end.
+fn bare_name(text: &str) -> &str {
+    let mut name = text.trim();
+    for (open, close) in [("(", ")"), ("[", "]"), ("{", "}"), ("<", ">")] {
+        let inner = name.strip_prefix(open);
+        let inner = inner.and_then(|inner| inner.strip_suffix(close));
+        name = inner.unwrap_or(name).trim();
+    }
+    let bare = name.trim_end_matches('.').trim_end();
+    if bare.is_empty() { name } else { bare }
+}
+
+/// Returns a name in lower case, without accents, hyphens and blanks, which some languages write between syllables.
+fn long_form(name: &str) -> String {
+    let mut plain = plain_form(name);
+    if name.chars().count() > SHORT_NAME {
+        plain.retain(|c| c != '-' && c != ' ');
+    }
+    plain
+}
+
+fn is_micrometres(long_form: &str) -> bool {
+    MICROMETRES.contains(&long_form)
+}
+
 #[cfg(test)]
 mod tests {
     use super::LengthUnit;
@@ -69,10 +182,43 @@ mod tests {
             ("METERS", LengthUnit::M),
             ("inches", LengthUnit::In),
             ("In", LengthUnit::In),
+            ("(mm)", LengthUnit::Mm),
+            ("[ CM. ]", LengthUnit::Cm),
+            ("in.", LengthUnit::In),
+            ("milimét", LengthUnit::Mm),
+            ("Xăng-ti-mét", LengthUnit::Cm),
+            ("mét", LengthUnit::M),
+            ("Zentimeter", LengthUnit::Cm),
+            ("\"", LengthUnit::In),
+            ("毫米", LengthUnit::Mm),
         ] {
             assert_eq!(LengthUnit::named(text), Ok(unit), "{text}");
         }
         let refused = LengthUnit::named("Feet").expect_err("no unit");
         assert!(refused.starts_with("\"Feet\" is not a unit"), "{refused}");
+        for text in ["", ".", "()", "m m", "m-m", "mm cm", "(mm", "mm2"] {
+            assert!(LengthUnit::named(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn micrometres_are_refused_with_the_way_to_mm() {
+        for text in [
+            "µm",
+            "\u{3bc}m",
+            "(um)",
+            "Microns",
+            "micrometres",
+            "mikrômét",
+        ] {
+            assert_eq!(
+                LengthUnit::named(text),
+                Err(format!(
+                    "micrometres (\"{text}\") are not read; divide the coordinates by 1000 and use mm"
+                ))
+            );
+            assert!(LengthUnit::is_name(text), "{text}");
+        }
+        assert!(LengthUnit::is_name("mm") && !LengthUnit::is_name("x"));
     }
 }

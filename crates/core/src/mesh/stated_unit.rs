@@ -18,20 +18,37 @@ pub(super) fn stated_unit(head: &[u8]) -> Option<LengthUnit> {
     })
 }
 
-/// Returns the unit that follows the word `unit` or `units` of a line. The word `in` is one only at the end.
+/// Returns the unit that follows the word `unit` or `units` of a line. The word `in` is one only at the end. A unit behind a
+/// number other than 1, as in `0.1 mm`, is none.
 fn unit_of(line: &[u8]) -> Option<LengthUnit> {
-    let line = String::from_utf8_lossy(line).to_ascii_lowercase();
+    let line = text_of(line).to_lowercase();
     let (_, rest) = line.split_once("unit")?;
-    let words = rest.split(|c: char| !c.is_ascii_alphabetic());
-    let mut words = words.filter(|word| !["", "s", "is", "are"].contains(word));
+    let words = rest.split(|c: char| !c.is_alphanumeric() && !".㎜㎝㎛".contains(c));
+    let words = words.map(|word| word.trim_matches('.'));
+    let mut words =
+        words.filter(|word| !["", "s", "is", "are"].contains(word) && number_of(word) != Some(1.0));
     match words.next()? {
         "in" => words.next().map_or(Some(LengthUnit::In), named_unit),
         word => named_unit(word),
     }
 }
 
-fn named_unit(name: &str) -> Option<LengthUnit> {
-    LengthUnit::named(name).ok()
+/// Returns a line as text. The letter µ of Windows-1252 is kept.
+fn text_of(line: &[u8]) -> String {
+    let of_bytes = || line.iter().map(|byte| char::from(*byte)).collect();
+    String::from_utf8(line.to_vec()).unwrap_or_else(|_not_utf8| of_bytes())
+}
+
+/// Returns the unit that a word is, which 1 may precede.
+fn named_unit(word: &str) -> Option<LengthUnit> {
+    let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
+    let (number, name) = word.split_at(word.len() - word.trim_start_matches(is_of_number).len());
+    let is_one = number.is_empty() || number_of(number) == Some(1.0);
+    is_one.then(|| LengthUnit::named(name).ok()).flatten()
+}
+
+fn number_of(word: &str) -> Option<f64> {
+    word.parse().ok()
 }
 
 #[cfg(test)]
@@ -51,9 +68,20 @@ mod tests {
             ("# units are in the manual", None),
             ("# unit vectors", None),
             ("# mm", None),
+            ("# units: µm", None),
+            ("# unit = 0.1 mm", None),
+            ("# unit = 1 mm", Some(LengthUnit::Mm)),
+            ("# unit: 10mm", None),
+            ("# unit: 1mm.", Some(LengthUnit::Mm)),
+            ("# 1 unit = 1.0 mm", Some(LengthUnit::Mm)),
+            ("# 1 unit = 0.001 m", None),
+            ("# Units: milimét", Some(LengthUnit::Mm)),
+            ("# units: [mm]", Some(LengthUnit::Mm)),
+            ("comment unit \"mm\"", Some(LengthUnit::Mm)),
         ] {
             assert_eq!(unit_of(line.as_bytes()), unit, "{line}");
         }
+        assert_eq!(unit_of(b"# units: \xb5m"), None);
         let xyz = b"# a scan\n# units: m\n0 0 0\n";
         assert_eq!(stated_unit(xyz), Some(LengthUnit::M));
         assert_eq!(stated_unit(b"0 0 0\nunits: m\n"), None);

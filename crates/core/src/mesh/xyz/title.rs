@@ -166,7 +166,7 @@ fn axis_columns(names: &[String]) -> Option<[usize; 3]> {
 }
 
 fn is_unit(name: &str) -> bool {
-    LengthUnit::named(name).is_ok()
+    LengthUnit::is_name(name)
 }
 
 /// Returns the names in a title in lower case: the letters and digits that its cells begin with, without quotes, brackets
