@@ -1,4 +1,4 @@
-//! Numbers below 1e15 that stand for a missing position, such as -9999 in all coordinates or in the height alone.
+//! Numbers below 1e15 that stand for a missing position, such as -9999 in all coordinates or in one of them.
 
 use super::extreme_vertices::ExtremeVertices;
 use super::inner_range::InnerRange;
@@ -40,22 +40,17 @@ pub(super) enum VertexKind {
     Points,
 }
 
-/// What vertices without a position have in common.
+/// A number that vertices without a position have along an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum FarValue {
-    /// All coordinates.
-    Position([f64; 3]),
-    /// The last coordinate.
-    Height(f64),
+pub(super) struct FarValue {
+    axis: usize,
+    value: f64,
 }
 
 impl FarValue {
     /// Returns whether a vertex has no position.
     pub(super) fn is_at(self, vertex: [f64; 3]) -> bool {
-        match self {
-            Self::Position(missing) => vertex == missing,
-            Self::Height(missing) => vertex[2] == missing,
-        }
+        vertex[self.axis] == self.value
     }
 }
 
@@ -71,7 +66,7 @@ impl FarValues {
 }
 
 /// Finds what stands for missing positions: a number far outside of the box around the other vertices that many vertices
-/// have, exactly, in all coordinates or as their height. If there is none, a height that usually stands for a missing one may
+/// have, exactly, along an axis. If there is none, a height that usually stands for a missing one may
 /// be nearer: -99, -999 and so on, and 0 in points without faces. Vertices that are no positions, as `is_position` says, do
 /// not count. `extremes` are vertices that may be far outside.
 pub(super) fn find_far_values(
@@ -111,20 +106,23 @@ pub(super) fn find_far_values(
     found.retain(|value| has(value, fewest));
     if found.is_empty() {
         let heights = ranges.known_heights(kind == VertexKind::Points);
-        found.extend(heights.map(FarValue::Height));
+        found.extend(heights.map(|value| FarValue { axis: 2, value }));
         found.retain(|value| has(value, fewest.max(count / VERTICES_PER_KNOWN)));
     }
     FarValues(found)
 }
 
-/// Returns the extreme positions and heights of a sample that are far outside of the box around its other vertices.
+/// Returns the numbers at the ends of a sample that are far outside of the box around its other vertices. Along x and y, those
+/// of vertices that are far along an earlier axis are left out.
 fn outside(sample: &[[f64; 3]], ranges: &AxisRanges) -> Vec<FarValue> {
-    let mut found: Vec<FarValue> = ranges.far_ends(2).map(FarValue::Height).collect();
-    for axis in [0, 1] {
-        for end in ranges.far_ends(axis) {
-            let vertex = sample.iter().find(|vertex| vertex[axis] == end);
-            let vertex = vertex.filter(|vertex| found.iter().all(|value| !value.is_at(**vertex)));
-            found.extend(vertex.map(|vertex| FarValue::Position(*vertex)));
+    let mut found: Vec<FarValue> = Vec::new();
+    for axis in [2, 0, 1] {
+        for value in ranges.far_ends(axis) {
+            let value = FarValue { axis, value };
+            let mut vertices = sample.iter().filter(|vertex| value.is_at(**vertex));
+            if vertices.any(|vertex| found.iter().all(|other| !other.is_at(*vertex))) {
+                found.push(value);
+            }
         }
     }
     found
@@ -211,6 +209,10 @@ mod tests {
         (0..1600).map(vertex).collect()
     }
 
+    fn of_height(value: f64) -> FarValue {
+        FarValue { axis: 2, value }
+    }
+
     fn found(more: &[[f64; 3]]) -> Vec<FarValue> {
         let vertices: Vertices = [relief(), more.to_vec()].concat().into();
         find(&vertices)
@@ -226,17 +228,25 @@ mod tests {
         for value in [-9999.0, -32768.0, 99999.0, 1e6] {
             for count in [16, 400, 3000] {
                 let all = found(&vec![[value; 3]; count]);
-                assert_eq!(all, [FarValue::Height(value)], "{value} {count}");
+                assert_eq!(all, [of_height(value)], "{value} {count}");
                 let height = found(&vec![[0.0, 0.0, value]; count]);
-                assert_eq!(height, [FarValue::Height(value)], "{value} {count}");
+                assert_eq!(height, [of_height(value)], "{value} {count}");
                 let flat = found(&vec![[value, value, 0.0]; count]);
-                let wanted = [FarValue::Position([value, value, 0.0])];
+                let wanted = [FarValue { axis: 0, value }];
                 assert_eq!(flat, wanted, "{value} {count}");
             }
         }
-        let columns = |k: usize| [k as f64 * 0.01, 3.0, -9999.0];
-        let columns: Vec<[f64; 3]> = (0..300).map(columns).collect();
-        assert_eq!(found(&columns), [FarValue::Height(-9999.0)]);
+        for axis in 0..3 {
+            let place = |k: usize| {
+                let mut place = [k as f64 * 0.01, 3.0, 1.0];
+                place.rotate_right(axis);
+                place[axis] = -9999.0;
+                place
+            };
+            let places: Vec<[f64; 3]> = (0..300).map(place).collect();
+            let value = -9999.0;
+            assert_eq!(found(&places), [FarValue { axis, value }]);
+        }
     }
 
     #[test]
@@ -264,12 +274,12 @@ mod tests {
         };
         for shift in [0.0, 5e5] {
             let few = [[shift, shift, -9999.0]; 8];
-            assert_eq!(find(&all(&few, shift)), [FarValue::Height(-9999.0)]);
+            assert_eq!(find(&all(&few, shift)), [of_height(-9999.0)]);
             assert_eq!(find(&all(&few[1..], shift)), []);
         }
         let two = [vec![[-9999.0; 3]; 3000], vec![[-32768.0; 3]; 9]].concat();
         let found = find(&all(&two, 0.0));
-        let wanted = [-32768.0, -9999.0].map(FarValue::Height);
+        let wanted = [-32768.0, -9999.0].map(of_height);
         assert_eq!(found, wanted);
     }
 
@@ -288,7 +298,7 @@ mod tests {
             (-32768.0, 1000.0),
         ] {
             let found = find(&with(value, scale, 0.0));
-            assert_eq!(found, [FarValue::Height(value)], "{value}");
+            assert_eq!(found, [of_height(value)], "{value}");
             assert_eq!(find(&with(value + 0.5, scale, 0.0)), [], "{value}");
         }
         let zeros = with(0.0, 1.0, 30.0);
@@ -296,7 +306,7 @@ mod tests {
             let check = PositionCheck::of(&zeros);
             find_far_values(&zeros, kind, &check.extremes, is_position).0
         };
-        assert_eq!(found(VertexKind::Points), [FarValue::Height(0.0)]);
+        assert_eq!(found(VertexKind::Points), [of_height(0.0)]);
         assert_eq!(found(VertexKind::Shared), []);
     }
 
@@ -323,9 +333,16 @@ mod tests {
 
     #[test]
     fn facets_with_a_corner_at_such_a_number_are_left_out_of_an_stl() {
-        let height = |k: usize, [x, y, z]: [f64; 3]| [x, y, if k % 50 == 7 { -9999.0 } else { z }];
+        let along = |axis: usize| {
+            surface(move |k, mut vertex| {
+                if k % 50 == 7 {
+                    vertex[axis] = -9999.0;
+                }
+                vertex
+            })
+        };
         let all = |k: usize, vertex| if k % 50 == 7 { [99999.0; 3] } else { vertex };
-        for mesh in [surface(height), surface(all)] {
+        for mesh in [along(0), along(1), along(2), surface(all)] {
             let is_missing = |corner: &u32| corner % 50 == 7;
             let missing = mesh.triangles.iter().flatten().filter(|at| **at % 50 == 7);
             let missing = missing.count() as u64;
