@@ -33,6 +33,12 @@ pub(super) const FOR_PICTURE: SampleSpread = SampleSpread {
     bytes: 256,
 };
 
+/// The end of a longer OBJ, where it has faces.
+const END_OF_FILE: SampleSpread = SampleSpread {
+    parts: 1,
+    bytes: 16 << 10,
+};
+
 /// Places of a file, evenly spread, from which vertices are read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SampleSpread {
@@ -174,7 +180,7 @@ fn each_position(
             b'\n'
         },
     };
-    let mut origins = 0_u64;
+    let (mut origins, mut has_faces) = (0_u64, false);
     let mut visit_other = |position: [f64; 3]| {
         if position == [0.0; 3] {
             origins += 1;
@@ -184,12 +190,20 @@ fn each_position(
     };
     match DetectedFormat::of(text, name)? {
         DetectedFormat::Ply => {
-            ply_parts(file, text, lines, limits, spread, &mut visit_other)?;
+            has_faces = ply_parts(file, text, lines, limits, spread, &mut visit_other)?;
         }
-        DetectedFormat::Obj => lines.visit(file, spread, |line| {
-            let position = after_keyword(line, b"v");
-            position.into_iter().for_each(&mut visit_other);
-        })?,
+        DetectedFormat::Obj => {
+            let mut visit_line = |line: &[u8]| {
+                let position = after_keyword(line, b"v");
+                position.into_iter().for_each(&mut visit_other);
+                has_faces |= is_face_of_obj(line);
+            };
+            lines.visit(file, spread, &mut visit_line)?;
+            // Few faces may be between all places, and are nearly always at the end.
+            lines.at_end().visit(file, END_OF_FILE, |line| {
+                has_faces |= is_face_of_obj(line);
+            })?;
+        }
         DetectedFormat::StlAscii => {
             lines.visit(file, spread, |line| {
                 let position = after_keyword(line, b"vertex");
@@ -213,7 +227,18 @@ fn each_position(
     if origins == 1 {
         visit([0.0; 3]);
     }
-    Ok((unit, VertexKind::Shared))
+    let kind = if has_faces {
+        VertexKind::Shared
+    } else {
+        VertexKind::Points
+    };
+    Ok((unit, kind))
+}
+
+/// Returns whether a line of an OBJ is a face with three or more corners. Other faces are left out.
+fn is_face_of_obj(line: &[u8]) -> bool {
+    let mut words = text::words(line);
+    words.next() == Some(b"f") && words.take(3).count() == 3
 }
 
 /// Returns the position that follows a keyword at the beginning of a line.
@@ -223,7 +248,8 @@ fn after_keyword(line: &[u8], keyword: &[u8]) -> Option<[f64; 3]> {
     is_vertex.then(|| text::position(words).ok()).flatten()
 }
 
-/// Visits vertices of a PLY file, which begins with `head`. `lines` is all of the file behind a byte order mark.
+/// Visits vertices of a PLY file, which begins with `head`. `lines` is all of the file behind a byte order mark. Returns whether
+/// its header counts faces.
 fn ply_parts(
     file: &mut (impl Read + Seek),
     head: &[u8],
@@ -231,9 +257,9 @@ fn ply_parts(
     limits: &MeshLimits,
     spread: SampleSpread,
     visit: &mut dyn FnMut([f64; 3]),
-) -> Result<(), MeshReadError> {
+) -> Result<bool, MeshReadError> {
     let Some(rows) = VertexRows::of(head, lines.end - lines.start)? else {
-        return Ok(());
+        return Ok(false);
     };
     limits.check_vertices(rows.rows)?;
     let mut add = |row: &[u8]| {
@@ -245,20 +271,20 @@ fn ply_parts(
         each_part(file, [start, end], size, spread, |part| {
             part.chunks_exact(size as usize).for_each(&mut add);
         })?;
-        return Ok(());
+        return Ok(rows.has_faces);
     }
     // A row is about as long as the first ones. Other elements follow.
     let first = head.get(rows.start as usize..).unwrap_or_default();
     let count = memchr::memchr_iter(lines.line_end, first).count().max(1);
     let about = rows.rows.saturating_mul(first.len() as u64) / count as u64;
     let end = start.saturating_add(about / 10 * 9).min(lines.end);
-    let rows = TextLines {
+    let places = TextLines {
         start,
         end,
         ..lines
     };
-    rows.visit(file, spread, add)?;
-    Ok(())
+    places.visit(file, spread, add)?;
+    Ok(rows.has_faces)
 }
 
 /// Visits parts of the rows between two offsets. The first part begins at the first one.
@@ -296,6 +322,12 @@ struct TextLines {
 }
 
 impl TextLines {
+    /// Returns the last lines, as many as [`END_OF_FILE`] reads.
+    fn at_end(self) -> Self {
+        let start = self.end.saturating_sub(END_OF_FILE.bytes).max(self.start);
+        Self { start, ..self }
+    }
+
     /// Visits lines at some places, with white space at their ends.
     fn visit(
         self,

@@ -127,6 +127,43 @@ fn numbers_for_missing_points_of_a_long_cloud_are_no_positions() {
 }
 
 #[test]
+fn zeros_for_missing_heights_of_long_points_are_no_heights_but_the_ground_of_faces_is() {
+    let position = |k: usize, [x, y, z]: [f64; 3]| {
+        let z = if k.is_multiple_of(50) { 0.0 } else { z + 35.0 };
+        format!("{:.7} {:.7} {z:.7}\n", x + 500.0, y + 500.0)
+    };
+    let rows = lines(420, position);
+    let obj = format!("v {}\n", rows.trim_end().replace('\n', "\nv "));
+    let count = 420 * 420;
+    let short = |value: f64| (value * 100.0) as i16;
+    let binary: Vec<u8> = (sheet(900).vertices.iter().enumerate())
+        .flat_map(|(k, [x, y, z])| [x, y, if k % 50 == 0 { 0.0 } else { z + 35.0 }])
+        .flat_map(|value| short(value).to_le_bytes())
+        .collect();
+    let points = [
+        ("a.xyz", rows.clone().into_bytes()),
+        ("a.obj", obj.clone().into_bytes()),
+        ("a.ply", ply("ascii", "float", count, 0, rows.as_bytes())),
+    ];
+    for (name, bytes) in points {
+        assert_sheet(long_sides(&bytes, name), name);
+    }
+    let bytes = ply("binary_little_endian", "short", 900 * 900, 0, &binary);
+    let sides = long_sides(&bytes, "b.ply");
+    assert_sheet(sides.map(|sides| sides.map(|side| side / 100.0)), "binary");
+    let faces = "f 1 2 421\n".repeat(3);
+    let rows = format!("{rows}{}", "3 0 1 420\n".repeat(3));
+    let meshes = [
+        ("a.obj", format!("{obj}{faces}").into_bytes()),
+        ("a.ply", ply("ascii", "float", count, 3, rows.as_bytes())),
+    ];
+    for (name, bytes) in meshes {
+        let [.., height] = long_sides(&bytes, name).expect(name);
+        assert!(height > 34.0, "{name}: {height}");
+    }
+}
+
+#[test]
 fn facets_at_numbers_for_missing_points_of_a_long_stl_are_no_positions() {
     let mut mesh = sheet(420);
     for k in (0..mesh.vertices.len()).step_by(50) {

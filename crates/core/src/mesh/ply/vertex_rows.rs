@@ -14,6 +14,8 @@ pub(in crate::mesh) struct VertexRows {
     pub(in crate::mesh) rows: u64,
     /// Bytes of a row; `None` in text.
     pub(in crate::mesh) size: Option<u64>,
+    /// Whether the header counts faces or triangle strips.
+    pub(in crate::mesh) has_faces: bool,
     encoding: PlyEncoding,
     /// Number of properties, which is that of the words of a row in text.
     properties: usize,
@@ -30,6 +32,9 @@ impl VertexRows {
         let (header, body) = PlyHeader::parse(head)?;
         let encoding = header.encoding;
         let mut start = body as u64;
+        let mut elements = header.elements.iter();
+        let has_faces = elements
+            .any(|element| matches!(&*element.name, "face" | "tristrips") && element.rows > 0);
         for element in &header.elements {
             let size = element.fixed_size().map(|size| size as u64);
             if element.name == "vertex" {
@@ -42,6 +47,7 @@ impl VertexRows {
                     start,
                     rows: element.rows,
                     size: (!is_text && size > 0).then_some(size),
+                    has_faces,
                     encoding,
                     properties: element.properties.len(),
                     columns: [x, y, z],
