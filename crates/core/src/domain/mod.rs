@@ -50,6 +50,7 @@ mod unit;
 mod value_error;
 mod verdict;
 mod worker_metrics;
+mod zeros;
 
 pub use address::{has_password, is_address, without_password};
 pub use alignment_prior::AlignmentPrior;
@@ -103,6 +104,7 @@ pub use unit::LengthUnit;
 pub use value_error::value_error_text;
 pub use verdict::{Reason, Verdict};
 pub use worker_metrics::{ComputeTimes, WaitReason, WorkerMetrics};
+pub use zeros::{ONLY_ZEROS, are_zeros, has_only_zeros};
 
 /// Milliseconds since the Unix epoch. The current time is always passed as an argument.
 pub type UnixMillis = i64;

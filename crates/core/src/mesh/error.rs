@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{FailureClass, FileKind};
+use crate::domain::{FailureClass, FileKind, ONLY_ZEROS};
 
 /// Why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +21,9 @@ pub enum MeshError {
     /// The file has no bytes.
     #[error("the file is empty (0 bytes)")]
     Empty,
+    /// All bytes of the file are zero.
+    #[error("the file {ONLY_ZEROS}")]
+    OnlyZeros,
     /// The content is of an unsupported format.
     #[error("{}", not_a_mesh(*.0))]
     NotAMesh(FileKind),
@@ -44,6 +47,18 @@ pub enum MeshError {
         /// Complete ones.
         have: u64,
         /// Count in the header.
+        want: u64,
+    },
+    /// A text has fewer points than a line before them says.
+    #[error(
+        "line {line} says that {want} points follow, but {have} do; copy the file again if it was cut, or correct the number"
+    )]
+    FewerPoints {
+        /// The line with the number, counted from 1.
+        line: u64,
+        /// Points that follow.
+        have: u64,
+        /// Their number as stated.
         want: u64,
     },
     /// The file holds more than its header says.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use super::error::{MeshLimits, MeshReadError};
+use super::error::{MeshError, MeshLimits, MeshReadError};
 use super::extreme_vertices::ExtremeVertices;
 use super::far_values::{FarValues, VertexKind, find_far_values};
 use super::format::DetectedFormat;
@@ -14,8 +14,8 @@ use super::triangle_mesh::Vertices;
 use super::triangle_stream::binary_stl_triangles;
 use super::xyz::SampledPoints;
 use super::{stl, text};
-use crate::domain::LengthUnit;
 use crate::domain::cancel::poll;
+use crate::domain::{LengthUnit, are_zeros, has_only_zeros};
 use crate::page_vec::fill;
 
 /// Files of at most this length are read as a whole.
@@ -162,6 +162,9 @@ fn each_position(
 ) -> Result<(Option<LengthUnit>, VertexKind), MeshReadError> {
     let mut head = Vec::new();
     file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+    if are_zeros(&head) && has_only_zeros(file)? {
+        return Err(MeshError::OnlyZeros.into());
+    }
     let unit = stated_unit(&head);
     if let Some(count) = binary_stl_triangles(&head, len, name)? {
         limits.check_triangles(u64::from(count))?;

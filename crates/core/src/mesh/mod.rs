@@ -37,8 +37,8 @@ pub use triangle_stream::{
 
 use std::io::{Read, Seek};
 
-use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
+use crate::domain::{FileKind, are_zeros};
 use crate::page_vec::PageVec;
 use far_values::VertexKind;
 use format::DetectedFormat;
@@ -78,6 +78,9 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
         (mesh, check, incomplete_faces)
     };
     let whole = |mesh| checked(mesh, 0);
+    if are_zeros(bytes) {
+        return Err(MeshError::OnlyZeros);
+    }
     let format = DetectedFormat::of(bytes, name)?;
     let bytes = match format {
         DetectedFormat::Obj | DetectedFormat::StlAscii | DetectedFormat::Xyz => {
@@ -92,7 +95,7 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
             stl::read_binary(bytes, limits).map(|(mesh, check)| (mesh, check, 0))
         }
         DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(whole),
-        DetectedFormat::Xyz => xyz::read(bytes, limits).map(whole),
+        DetectedFormat::Xyz => xyz::read(bytes, name, limits).map(whole),
     }
     .map_err(|fault| text::fault_at_end(fault, bytes))?;
     if mesh.vertices.is_empty() {
@@ -140,7 +143,9 @@ pub fn read_from(
         .by_ref()
         .take(stl::HEADER as u64)
         .read_to_end(&mut head)?;
-    let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
+    let is_other = head.starts_with(BYTE_ORDER_MARK)
+        || FileKind::of(&head) == FileKind::Ply
+        || are_zeros(&head);
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         let (mesh, check) = stl::read_facets(&mut source, count, limits)?;
         return Ok(check.without_missing(mesh, VertexKind::Corners, 0)?);
@@ -342,6 +347,12 @@ mod tests {
     #[test]
     fn error_names_the_type_of_other_files() {
         assert_eq!(read(b"", "a.ply", &LIMITS), Err(MeshError::Empty));
+        for name in ["a.stl", "a.ply", "a.obj", "a.xyz"] {
+            for len in [1, 84, 85, 5000] {
+                let zeros = read(&vec![0; len], name, &LIMITS);
+                assert_eq!(zeros, Err(MeshError::OnlyZeros), "{name} {len}");
+            }
+        }
         let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
         assert_eq!(
             read(png, "a.stl", &LIMITS),

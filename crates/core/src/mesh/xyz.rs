@@ -15,6 +15,7 @@ mod tests;
 mod time_order;
 mod title;
 
+use super::format::has_extension;
 use super::{Mesh, MeshError, MeshLimits, text};
 use crate::domain::cancel::polled;
 use crate::domain::named_separator;
@@ -33,13 +34,20 @@ const TITLE_LINES: usize = 8;
 /// space, commas, semicolons or what a line such as `sep=|` names, and may have decimal commas. Lines before the first point
 /// may be comments, the number of points or the names of the columns. A first column with numbers of points is ignored. An
 /// empty cell is a missing coordinate. The headers of PTX scans are applied.
-pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+///
+/// In a file named `*.pts`, the number before the points is theirs, so fewer points are refused.
+pub(super) fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
     let separated = odd_separator(bytes).map(|odd| with_semicolons(bytes, odd));
     let bytes = separated.as_deref().unwrap_or(bytes);
-    let found = match ptx::points(bytes, limits) {
-        Some(points) => points?,
-        None => plain_or_quoted_points(bytes, limits)?,
+    let found = if let Some(points) = ptx::points(bytes, limits) {
+        points?
+    } else {
+        let points = plain_or_quoted_points(bytes, limits)?;
+        if has_extension(name, "pts") {
+            check_stated(bytes, points.len() as u64)?;
+        }
+        points
     };
     Ok(Mesh {
         vertices: found.into(),
@@ -123,7 +131,8 @@ fn positions(
             Err(reason) => {
                 // The next scan of a PTS file begins with its count where the one before it ends.
                 let have = points.len() as u64;
-                let end = scan_end.or_else(|| title::stated_count(bytes, layout.first_point));
+                let of_first = || title::stated_count(bytes, layout.first_point);
+                let end = scan_end.or_else(|| of_first().map(|(_, count)| count));
                 let count = title::count_of(row).filter(|_| end == Some(have));
                 let count = count.ok_or(MeshError::Line { line, reason })?;
                 scan_end = Some(have.saturating_add(count));
@@ -131,6 +140,34 @@ fn positions(
         }
     }
     Ok(points)
+}
+
+/// Checks that a PTS file has as many points as its first line and the first lines of further scans say. More points are read:
+/// the number may be one of something else.
+///
+/// # Errors
+/// Returns an error that names the line of the last scan.
+fn check_stated(bytes: &[u8], points: u64) -> Result<(), MeshError> {
+    // Points with quotation marks may have no such layout.
+    let Ok(layout) = PointLayout::of(bytes) else {
+        return Ok(());
+    };
+    let Some((mut line, mut want)) = title::stated_count(bytes, layout.first_point) else {
+        return Ok(());
+    };
+    let (mut first, mut before) = (0, 0);
+    for (number, row) in layout.rows(bytes) {
+        if layout.position(row).is_ok() {
+            before += 1;
+        } else if let Some(count) = title::count_of(row) {
+            (line, first, want) = (number, before, count);
+        }
+    }
+    let have = points.saturating_sub(first);
+    if have < want {
+        return Err(MeshError::FewerPoints { line, have, want });
+    }
+    Ok(())
 }
 
 /// The columns of a long file, of which only some lines are read.
@@ -178,5 +215,36 @@ impl SampledPoints {
         let separated = self.odd_separator.map(|odd| with_semicolons(raw, odd));
         let row = self.layout.row(separated.as_deref().unwrap_or(raw))?;
         self.layout.position(row).ok()
+    }
+}
+
+#[cfg(test)]
+mod count_tests {
+    use super::read;
+    use crate::mesh::MeshLimits;
+
+    #[test]
+    fn fewer_points_than_a_pts_file_states_are_refused() {
+        let row = |k: u32| format!("{}.5 {}.25 1.125 0.5\n", k * 5 % 11, k % 7);
+        let rows = |count: u32| (0..count).map(row).collect::<String>();
+        let open = |text: &str, name: &str| {
+            let read = read(text.as_bytes(), name, &MeshLimits::SUGGESTED);
+            read.map(|mesh| mesh.vertices.len())
+                .map_err(|error| error.to_string())
+        };
+        let cut = format!("20\n{}", rows(17));
+        let said = "line 1 says that 20 points follow, but 17 do; copy the file again if it was cut, or correct the number";
+        assert_eq!(open(&cut, "a.PTS"), Err(said.to_owned()));
+        // The number may be another one, such as a date.
+        assert_eq!(open(&cut, "a.xyz"), Ok(17));
+        let several = format!("17\n{}20\n{}", rows(17), rows(5));
+        let said = "line 19 says that 20 points follow, but 5 do; copy the file again if it was cut, or correct the number";
+        assert_eq!(open(&several, "a.pts"), Err(said.to_owned()));
+        for (count, have) in [("17", 17), ("12", 17), ("", 17)] {
+            let text = format!("{count}\n{}", rows(17));
+            assert_eq!(open(&text, "a.pts"), Ok(have), "{count}");
+        }
+        let several = format!("17\n{}5\n{}", rows(17), rows(5));
+        assert_eq!(open(&several, "a.pts"), Ok(22));
     }
 }

@@ -1,7 +1,7 @@
 //! Errors of the reader of labels.
 
 use super::message::{boxes, for_count, list, quoted};
-use mocban_core::domain::{pointer_of, sanitize};
+use mocban_core::domain::{ONLY_ZEROS, pointer_of, sanitize};
 
 /// Maximum number of characters of a reason, which may quote the file.
 const MAX_REASON: usize = 300;
@@ -30,6 +30,9 @@ pub enum LabelsProblem {
         /// Largest size.
         limit: u64,
     },
+    /// All bytes of the file are zero.
+    #[error("the file {ONLY_ZEROS}")]
+    OnlyZeros,
     /// The file is a pointer of Git LFS.
     #[error("the file {}", pointer_of("labels"))]
     Pointer,

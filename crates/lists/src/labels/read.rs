@@ -12,7 +12,7 @@ use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
 use crate::json_numbers::unknown_number;
-use mocban_core::domain::{FileKind, SeparatorLines, UniqueKeys, sanitize};
+use mocban_core::domain::{FileKind, SeparatorLines, UniqueKeys, are_zeros, sanitize};
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -56,6 +56,9 @@ fn parse(bytes: &[u8], page: &PageFile<'_>) -> Result<(LabelFormat, PageRegions)
             bytes: bytes.len() as u64,
             limit: MAX_BYTES as u64,
         });
+    }
+    if are_zeros(bytes) {
+        return Err(LabelsProblem::OnlyZeros);
     }
     let text = std::str::from_utf8(bytes).map_err(|_error| {
         let kind = FileKind::of(bytes);

@@ -262,6 +262,21 @@ fn the_header_of_a_long_scan_of_ptx_has_no_points() {
 }
 
 #[test]
+fn a_long_file_of_zeros_is_named() {
+    let bytes = vec![0; WHOLE_BYTES as usize + 1];
+    for name in ["a.stl", "a.ply", "a.xyz"] {
+        let refused = found(&bytes, name).expect_err(name).to_string();
+        assert_eq!(
+            refused,
+            "the file has only zeros; was the copy interrupted? copy it again"
+        );
+    }
+    let other = [&bytes[..], b"v 1 2 3\n"].concat();
+    let refused = found(&other, "a.ply").expect_err("no mesh").to_string();
+    assert!(refused.starts_with("the file is binary data"), "{refused}");
+}
+
+#[test]
 fn the_unit_and_all_vertices_of_a_short_file_are_known() {
     let xyz = b"# units: m\n0 0 0\n0.04 0.03 0\n0 0.01 0\n";
     let found = found(xyz, "a.xyz").expect("points");

@@ -178,7 +178,7 @@ mod tests {
                 "the binary STL is truncated: it holds 1 of 2 triangles"
             );
         }
-        let error = open(&[0; 50]).expect_err("truncated");
+        let error = open(&[&b"\0x"[..], &[0; 48]].concat()).expect_err("truncated");
         assert_eq!(
             error.to_string(),
             "the binary STL is truncated: it holds 50 of 84 bytes of its header"

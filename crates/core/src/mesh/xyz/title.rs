@@ -89,10 +89,10 @@ pub(super) fn count_of(line: &[u8]) -> Option<u64> {
         .flatten()
 }
 
-/// Returns the number of points that a line before the first one states.
-pub(super) fn stated_count(bytes: &[u8], first_point: u64) -> Option<u64> {
+/// Returns the number of points that a line before the first one states, behind the number of this line.
+pub(super) fn stated_count(bytes: &[u8], first_point: u64) -> Option<(u64, u64)> {
     let mut before = text::lines(bytes).take_while(|(line, _)| *line < first_point);
-    before.find_map(|(_, line)| count_of(line))
+    before.find_map(|(number, line)| Some((number, count_of(line)?)))
 }
 
 /// Returns whether a line before the points is a count of them, units, a separator or a quoted text, which has no numbers if

@@ -1,6 +1,6 @@
 //! Errors of the print image decoder.
 
-use crate::domain::{FailureClass, FileKind, sanitize};
+use crate::domain::{FailureClass, FileKind, ONLY_ZEROS, sanitize};
 
 /// Why a print image could not be decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -8,6 +8,9 @@ pub enum DecodeError {
     /// The file has no bytes.
     #[error("the file is empty (0 bytes)")]
     Empty,
+    /// All bytes of the file are zero.
+    #[error("the file {ONLY_ZEROS}")]
+    OnlyZeros,
     /// The content is of another kind than PNG, JPEG or TIFF.
     #[error("{}", not_an_image(*.0))]
     NotAnImage(FileKind),
@@ -50,6 +53,17 @@ pub enum DecodeError {
     /// The file ends before the image does.
     #[error("the {} is truncated: it ends before the image does", .0.name())]
     Truncated(FileKind),
+    /// The content of the file was changed, as by a disk or a copy that failed.
+    #[error(
+        "the {} is damaged; copy it again, or open it in another program and save it as PNG (the decoder found: {found})",
+        .kind.name()
+    )]
+    Damaged {
+        /// The kind of file by its signature.
+        kind: FileKind,
+        /// What the decoder found.
+        found: String,
+    },
     /// The file violates its format, or uses an unsupported part of it.
     #[error("the {} cannot be decoded: {reason}", .kind.name())]
     Broken {
@@ -72,6 +86,15 @@ pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
     DecodeError::Broken {
         kind,
         reason: sanitize(reason, 160),
+    }
+}
+
+/// Says what a decoder found in a damaged file, sanitised and on one line.
+pub(super) fn damaged(kind: FileKind, found: &str) -> DecodeError {
+    let found = found.trim_end_matches('.').replace("; ", ", ");
+    DecodeError::Damaged {
+        kind,
+        found: sanitize(&found, 160),
     }
 }
 

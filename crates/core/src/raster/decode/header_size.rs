@@ -9,8 +9,8 @@ use super::limits::ImageLimits;
 use super::orientation::{StatedOrientation, of_tag, swaps_sides};
 use super::tags::TagFileWindow;
 use super::tiff;
-use crate::domain::FileKind;
 use crate::domain::cancel::poll;
+use crate::domain::{FileKind, has_only_zeros};
 use crate::page_vec::fill;
 
 /// Bytes at the end of a JPEG in which the mark of its end is searched. Some programs write metadata behind it.
@@ -49,6 +49,9 @@ pub fn header_size(
         }
         FileKind::Jpeg => jpeg_size(&mut file, len),
         FileKind::Png => png_size(&mut file),
+        FileKind::Binary if has_only_zeros(&mut file).unwrap_or(false) => {
+            return Err(DecodeError::OnlyZeros);
+        }
         other => return Err(DecodeError::NotAnImage(other)),
     };
     let ([width, height], orientation) = stored.ok_or(DecodeError::Truncated(kind))?;

@@ -16,13 +16,14 @@ mod tiff;
 
 use std::io::{BufRead, Cursor, Seek};
 
+use flate2::Crc;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
-use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
+use crate::domain::{FileKind, are_zeros};
 
 use colour_profile::FileProfile;
-use error::broken;
+use error::{broken, damaged};
 use light_curve::LightCurve;
 use orientation::StatedOrientation;
 use png_chunks::png_colour_chunk;
@@ -79,6 +80,7 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
             let image = jpeg::decode(bytes, limits)?;
             (image.rgb, image.orientation, image.profile, None)
         }
+        _ if are_zeros(bytes) => return Err(DecodeError::OnlyZeros),
         other => return Err(DecodeError::NotAnImage(other)),
     };
     let mut image = PrintImage {
@@ -112,7 +114,17 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
         let side = field.map(|field| u32::from_be_bytes(*field));
         side.ok_or(DecodeError::Truncated(FileKind::Png))
     };
-    limits.check_size(side(16)?, side(20)?)
+    let checked = limits.check_size(side(16)?, side(20)?);
+    checked.map_err(|error| {
+        let mut checksum = Crc::new();
+        checksum.update(bytes.get(12..29).unwrap_or_default());
+        match side(29) {
+            Ok(stored) if stored != checksum.sum() => {
+                damaged(FileKind::Png, "a wrong checksum of its header")
+            }
+            _ => error,
+        }
+    })
 }
 
 /// Decodes the pixels of a PNG in stored order, and returns them with its ICC profile.
@@ -143,6 +155,9 @@ fn decode_png(
 /// Bytes at the end of a PNG that are not all zero. Those of a file that was not written to its end may be.
 const PNG_END: usize = 12;
 
+/// Begins what the decoder says of a PNG.
+const DECODER_WORDS: &str = "Format error decoding Png: ";
+
 fn png_error(error: &ImageError, bytes: &[u8]) -> DecodeError {
     let reason = error.to_string();
     let early_end = match error {
@@ -152,7 +167,13 @@ fn png_error(error: &ImageError, bytes: &[u8]) -> DecodeError {
     if early_end || bytes.ends_with(&[0; PNG_END]) {
         return DecodeError::Truncated(FileKind::Png);
     }
-    broken(FileKind::Png, &reason)
+    match error {
+        ImageError::Unsupported(_) | ImageError::Limits(_) => broken(FileKind::Png, &reason),
+        _ => {
+            let found = reason.strip_prefix(DECODER_WORDS).unwrap_or(&reason);
+            damaged(FileKind::Png, found)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -162,7 +183,7 @@ mod tests {
     use image::{DynamicImage, ImageFormat};
     use proptest::prelude::*;
 
-    use super::error::broken;
+    use super::error::{broken, damaged};
     use super::{DecodeError, decode};
 
     #[test]
@@ -314,6 +335,7 @@ mod tests {
     #[test]
     fn error_names_the_type_of_other_files() {
         assert_eq!(decode(b"", &LIMITS), Err(DecodeError::Empty));
+        assert_eq!(decode(&[0; 700], &LIMITS), Err(DecodeError::OnlyZeros));
         assert_eq!(
             decode(b"id,mesh,print\n", &LIMITS),
             Err(DecodeError::NotAnImage(FileKind::Text))
@@ -340,6 +362,30 @@ mod tests {
                 says
             );
         }
+    }
+
+    #[test]
+    fn damaged_images_are_named_with_what_to_do() {
+        let rgb = image::RgbImage::from_fn(64, 64, |x, y| {
+            image::Rgb([(x * 37 % 251) as u8, (y * x % 83) as u8, (y * 7) as u8])
+        });
+        let whole = file(&DynamicImage::ImageRgb8(rgb), ImageFormat::Png);
+        let middle = whole.len() / 2;
+        // In the data, and in the width.
+        for at in [middle, 16] {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 0xff;
+            let said = decode(&bytes, &LIMITS).expect_err("damaged").to_string();
+            let start = "the PNG image is damaged; copy it again, or open it in another program and save it as PNG (the \
+                         decoder found: ";
+            assert!(said.starts_with(start), "{said}");
+            assert!(!said.contains("Format error"), "{said}");
+        }
+        assert_eq!(
+            damaged(FileKind::Tiff, "a; b.").to_string(),
+            "the TIFF image is damaged; copy it again, or open it in another program and save it as PNG (the decoder \
+             found: a, b)"
+        );
     }
 
     #[test]

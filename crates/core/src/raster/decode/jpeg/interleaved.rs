@@ -8,7 +8,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::polled_bytes::PolledBytes;
 use crate::domain::FileKind;
-use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::error::{DecodeError, broken, damaged};
 
 /// Samples of 8 bits, pixel by pixel.
 #[derive(Debug, PartialEq)]
@@ -65,6 +65,9 @@ fn refused(error: &DecodeErrors) -> DecodeError {
         DecodeErrors::ExhaustedData | DecodeErrors::IoErrors(ZByteIoError::NotEnoughBytes(..)) => {
             DecodeError::Truncated(FileKind::Jpeg)
         }
-        other => broken(FileKind::Jpeg, &other.to_string()),
+        DecodeErrors::Unsupported(_) | DecodeErrors::LargeDimensions(_) => {
+            broken(FileKind::Jpeg, &error.to_string())
+        }
+        other => damaged(FileKind::Jpeg, &other.to_string()),
     }
 }

@@ -13,7 +13,7 @@ use super::predictor::{undo_float, undo_horizontal};
 use super::shared_chroma;
 use crate::domain::FileKind;
 use crate::domain::cancel::poll;
-use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::error::{self, DecodeError, broken};
 use crate::raster::decode::jpeg;
 
 /// Bytes that are decompressed between two polls for a cancellation.
@@ -24,7 +24,7 @@ fn truncated() -> DecodeError {
 }
 
 fn damaged(method: &str) -> DecodeError {
-    broken(FileKind::Tiff, &format!("its {method} data are damaged"))
+    error::damaged(FileKind::Tiff, &format!("damaged {method} data"))
 }
 
 /// A part of the image that is decompressed: the rows of a strip or tile, of each plane.
@@ -178,7 +178,12 @@ impl TiffLayout<'_> {
             joined.as_deref().unwrap_or(stored),
             [width, self.chunk[1].max(rows)],
         )
-        .map_err(|error| failed(format!("in a strip or tile, {error}")))?;
+        .map_err(|error| match error {
+            DecodeError::Damaged { found, .. } => {
+                error::damaged(FileKind::Tiff, &format!("in a strip or tile, {found}"))
+            }
+            error => failed(format!("in a strip or tile, {error}")),
+        })?;
         let len = width * rows * self.samples;
         if image.width != width || image.channels != self.samples || self.bits != 8 {
             return Err(failed(format!(

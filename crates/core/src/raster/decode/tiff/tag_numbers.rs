@@ -1,7 +1,7 @@
 //! Values of tags that decide how a page is read.
 
 use crate::domain::FileKind;
-use crate::raster::decode::error::{DecodeError, broken};
+use crate::raster::decode::error::{DecodeError, broken, damaged};
 use crate::raster::decode::tags::{TagDirectory, TagValues};
 
 /// Refuses a file for a reason.
@@ -18,7 +18,10 @@ pub(super) fn values<'b>(
     tag: u64,
 ) -> Result<Option<TagValues<'b>>, DecodeError> {
     match page.values(tag) {
-        None if page.has(tag) => refuse(&format!("the values of its tag {tag} cannot be read")),
+        None if page.has(tag) => {
+            let found = format!("values of its tag {tag} outside of the file");
+            Err(damaged(FileKind::Tiff, &found))
+        }
         values => Ok(values),
     }
 }
