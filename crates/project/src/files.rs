@@ -9,7 +9,7 @@ use super::exit::Refusal;
 use super::input_paths::in_existing_form;
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 use mocban_core::domain::spelling::quoted;
-use mocban_core::domain::{ErrorCode, FileKind, pointer_of, sanitize};
+use mocban_core::domain::{ErrorCode, FileKind, ONLY_ZEROS, are_zeros, pointer_of, sanitize};
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{create_folders, open_regular, read_file_or_pipe, read_up_to, write_atomic};
 
@@ -22,6 +22,10 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))?;
     if FileKind::of(&bytes[..bytes.len().min(HEAD_BYTES)]) == FileKind::LfsPointer {
         let text = format!("{} {}", path.display(), pointer_of("file"));
+        return Err(Refusal::Usage(text));
+    }
+    if are_zeros(&bytes) {
+        let text = format!("{} {ONLY_ZEROS}", path.display());
         return Err(Refusal::Usage(text));
     }
     if let Some(document) = locked_document(path) {

@@ -169,7 +169,7 @@ pub async fn import_blocks(
     if missing.count == 0 {
         block_files::check(&listing.rows, &listing.label, &project)?;
     }
-    listing.warnings.extend(searches.unusable.warnings());
+    listing.warnings.extend(searches.warnings());
     let limits = location.settings()?.config.limits;
     let doubts = block_scale::doubts(&listing.rows, &listing.label, &project, &limits);
     listing.warnings.extend(doubts);

@@ -107,11 +107,14 @@ impl Listing {
         let (mut misspelt, mut unread) = (MisspeltColumns::default(), UnreadRows::default());
         let left_out: BTreeSet<String> = choices.changes.left_out.iter().cloned().collect();
         let (mut repeated, mut ids) = (RepeatedFiles::default(), ChangedIds::default());
-        let mut decimal_ids = DecimalIds::default();
+        let (mut decimal_ids, mut blocks) = (DecimalIds::default(), ChangedIds::of_blocks());
         let mut each = |row: ManifestRow| {
             misspelt.add(&row);
             ids.add(row.line, row.name.as_str(), [&row.mesh, &row.print]);
             decimal_ids.add(row.line, row.name.as_str());
+            if let Some(block) = &row.block {
+                blocks.add(row.line, block, [&row.mesh, &row.print]);
+            }
             unread.add(&row);
             if !left_out.contains(row.name.as_str()) {
                 repeated.add(row.line, row.name.as_str(), &row.mesh, &row.print);
@@ -128,6 +131,7 @@ impl Listing {
         warnings.extend(read.unusual_cells.warnings());
         warnings.extend(read.unread_columns.warnings());
         warnings.extend(ids.warning());
+        warnings.extend(blocks.warning());
         warnings.extend(decimal_ids.warning(&read.ids));
         match unread.warnings() {
             Ok(unread) => warnings.extend(unread),
@@ -233,6 +237,7 @@ impl Listing {
     ) -> ListedRows {
         let mut searches = FileSearches::default();
         let mut each = |mut row: ManifestRow| {
+            searches.add_paths(&row, project);
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
             let missing = files
@@ -276,10 +281,8 @@ impl Listing {
                 hash.value()
             }
         };
-        ListedRows {
-            hash,
-            unusable: searches.unusable.warnings(),
-        }
+        let unusable = searches.warnings();
+        ListedRows { hash, unusable }
     }
 }
 

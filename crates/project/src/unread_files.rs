@@ -124,9 +124,7 @@ pub(crate) struct UnreadRows {
     prints: BTreeSet<PathBuf>,
     /// Whether a row has files that may be read.
     has_others: bool,
-    /// Number of rows with one file as mesh and print, and the id and line of the first.
-    with_one_file: usize,
-    first_with_one: Option<(String, usize)>,
+    with_one_file: OneFileRows,
 }
 
 impl UnreadRows {
@@ -145,10 +143,8 @@ impl UnreadRows {
             self.prints.insert(row.print.clone());
         }
         self.has_others |= !mesh && !print;
-        if row.mesh == row.print {
-            self.with_one_file += 1;
-            let first = || (row.name.as_str().to_owned(), row.line);
-            self.first_with_one.get_or_insert_with(first);
+        if row.mesh.as_os_str() == row.print.as_os_str() {
+            self.with_one_file.count(row.line, row.name.as_str());
         }
     }
 
@@ -160,13 +156,7 @@ impl UnreadRows {
         let mut found = UnreadFiles::of(&self.meshes, "", FileKind::mesh_advice);
         found.append(UnreadFiles::of(&self.prints, "", FileKind::image_advice));
         if self.has_others || found.sentences.is_empty() {
-            let count = self.with_one_file;
-            found.sentences.extend(self.first_with_one.map(|(id, line)| {
-                let id = quoted(&id);
-                format!(
-                    "pairs with one file as mesh and print: {count}, the first {id} on line {line}; name a scan and an image"
-                )
-            }));
+            found.sentences.extend(self.with_one_file.warning());
             Ok(found.sentences)
         } else {
             Err(found.sentences.join("\n"))
@@ -174,9 +164,49 @@ impl UnreadRows {
     }
 }
 
+/// Rows with one file as mesh and print.
+#[derive(Debug, Default)]
+pub(crate) struct OneFileRows {
+    rows: usize,
+    /// Id and line of the first.
+    first: Option<(String, usize)>,
+}
+
+impl OneFileRows {
+    /// Looks at a row whose paths differ, but may lead to one file, also through links.
+    pub(crate) fn add(&mut self, line: usize, id: &str, files: &[PathBuf; 2]) {
+        // Few rows have a mesh and a print of the same length, and only for these are links followed.
+        let [mesh, print] = [0, 1].map(|at| files[at].metadata().map(|meta| meta.len()).ok());
+        if mesh.is_none() || mesh != print {
+            return;
+        }
+        let [mesh, print] = [0, 1].map(|at| files[at].canonicalize().ok());
+        if mesh.is_some() && mesh == print {
+            self.count(line, id);
+        }
+    }
+
+    fn count(&mut self, line: usize, id: &str) {
+        self.rows += 1;
+        self.first.get_or_insert_with(|| (id.to_owned(), line));
+    }
+
+    pub(crate) fn warning(self) -> Option<String> {
+        let count = self.rows;
+        self.first.map(|(id, line)| {
+            let id = quoted(&id);
+            format!(
+                "pairs with one file as mesh and print: {count}, the first {id} on line {line}; name a scan and an image"
+            )
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
+
+    use super::OneFileRows;
 
     use crate::manifest_file::Listing;
     use crate::pair_choices::PairChoices;
@@ -246,6 +276,30 @@ mod tests {
         assert!(
             warnings.iter().any(|found| found == warning),
             "{warnings:?}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_is_mesh_and_print_is_named_under_other_paths() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let place = |name: &str| dir.path().join(name);
+        for (name, content) in [("a.stl", "mesh"), ("a.png", "png"), ("b.png", "mesh")] {
+            std::fs::write(place(name), content).expect("written");
+        }
+        std::os::unix::fs::symlink("a.stl", place("link.png")).expect("a link");
+        std::os::unix::fs::symlink(".", place("here")).expect("a link");
+        let mut rows = OneFileRows::default();
+        for (line, print) in
+            (2..).zip(["a.png", "b.png", "./a.stl", "link.png", "here/a.stl", "no"])
+        {
+            rows.add(line, print, &[place("a.stl"), place(print)]);
+        }
+        assert_eq!(
+            rows.warning().as_deref(),
+            Some(
+                "pairs with one file as mesh and print: 3, the first \"./a.stl\" on line 4; name a scan and an image"
+            )
         );
     }
 }

@@ -1,13 +1,15 @@
 //! Files of a list that cannot be inputs: pointers of Git LFS, in whose place the content was not fetched, empty files,
-//! archives, and files that cannot be read.
+//! archives, files of zeros, and files that cannot be read.
 
 use std::fs::Metadata;
 use std::path::Path;
 
 use super::files::kind;
 use super::input_paths::SimilarFiles;
-use super::unread_files::archive_kind;
-use mocban_core::domain::{FileKind, sanitize};
+use super::unread_files::{OneFileRows, archive_kind};
+use mocban_core::domain::{FileKind, has_only_zeros, sanitize};
+use mocban_lists::manifest::ManifestRow;
+use mocban_store::{Project, open_regular};
 
 /// Longest pointer in bytes. The specification of Git LFS demands fewer than 1024.
 const MAX_POINTER_BYTES: u64 = 1024;
@@ -21,6 +23,29 @@ const MAX_OPENED: usize = 500;
 pub(crate) struct FileSearches {
     pub(crate) similar: SimilarFiles,
     pub(crate) unusable: UnusableFiles,
+    pub(crate) linked: OneFileRows,
+}
+
+impl FileSearches {
+    /// Looks at the paths of a pair, which may lead to one file although they differ.
+    pub(crate) fn add_paths(&mut self, row: &ManifestRow, project: &Project) {
+        if row.mesh.as_os_str() == row.print.as_os_str() {
+            return;
+        }
+        let place = |path: &Path| match path.to_str() {
+            Some(stored) if project.is_below_root(stored) => project.input_path(stored),
+            _ => path.to_owned(),
+        };
+        let files = [&row.mesh, &row.print].map(|path| place(path));
+        self.linked.add(row.line, row.name.as_str(), &files);
+    }
+
+    /// Returns warnings about what was found.
+    pub(crate) fn warnings(self) -> Vec<String> {
+        let mut warnings = self.unusable.warnings();
+        warnings.extend(self.linked.warning());
+        warnings
+    }
 }
 
 /// Pointers of Git LFS, and other files that cannot be inputs.
@@ -29,6 +54,7 @@ pub(crate) struct UnusableFiles {
     pointers: CountedFiles,
     empty: CountedFiles,
     archives: CountedFiles,
+    zeros: CountedFiles,
     unreadable: CountedFiles,
     /// Number of longer files that were opened.
     opened: usize,
@@ -75,6 +101,7 @@ impl UnusableFiles {
             Some(found) if found.is_archive() && archive_kind(path).is_none() => {
                 self.archives.add(path);
             }
+            Some(FileKind::Binary) if is_of_zeros(path) => self.zeros.add(path),
             Some(_) => {}
         }
     }
@@ -105,6 +132,13 @@ impl UnusableFiles {
                 ],
             ),
             sentence(
+                &self.zeros,
+                [
+                    "files that have only zeros, as interrupted copies may",
+                    "copy them again before the run",
+                ],
+            ),
+            sentence(
                 &self.unreadable,
                 [
                     "files that may not be read",
@@ -114,6 +148,12 @@ impl UnusableFiles {
         ];
         sentences.into_iter().flatten().collect()
     }
+}
+
+/// Returns whether all bytes of a file are zero.
+fn is_of_zeros(path: &Path) -> bool {
+    let file = open_regular(path).ok();
+    file.is_some_and(|(mut file, _)| has_only_zeros(&mut file).unwrap_or(false))
 }
 
 #[cfg(test)]
@@ -134,6 +174,8 @@ mod tests {
             ("c.json", marked.as_str()),
             ("d.stl", "PK\u{3}\u{4}  "),
             ("e.zip", "PK\u{3}\u{4}  "),
+            ("f.stl", &"\0".repeat(9000)),
+            ("g.stl", &format!("{}x", "\0".repeat(9000))),
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");
@@ -141,7 +183,7 @@ mod tests {
             found.add(&path, &meta);
         }
         let place = |name: &str| dir.path().join(name).display().to_string();
-        let [first, empty, archive] = ["b.stl", "c.png", "d.stl"].map(place);
+        let [first, empty, archive, zeros] = ["b.stl", "c.png", "d.stl", "f.stl"].map(place);
         assert_eq!(
             found.warnings(),
             [
@@ -152,6 +194,9 @@ mod tests {
                 format!("files that are empty: 1, the first {empty}; replace them before the run"),
                 format!(
                     "files that are archives: 1, the first {archive}; unpack them, and import the files in them"
+                ),
+                format!(
+                    "files that have only zeros, as interrupted copies may: 1, the first {zeros}; copy them again before the run"
                 ),
             ]
         );

@@ -22,7 +22,7 @@ use mocban_core::domain::{PairName, UnixMillis};
 use mocban_lists::columns::{HeaderColumns, SameColumn};
 use mocban_lists::manifest::{
     CsvText, LineCounter, NotText, as_utf8, fits_header, is_array, later_header, plain_cell,
-    plain_header, trimmed, whole_part,
+    plain_header, trimmed, whole_and_decimals, whole_part,
 };
 use mocban_lists::quotes::check_quotes;
 use mocban_system::time_text::{day, duration};
@@ -235,7 +235,7 @@ pub fn unknown_pairs(
 }
 
 /// Returns the pairs that some names are likely to mean, each by its name: Python writes whole numbers with `.0` if a value of
-/// their column is missing.
+/// their column is missing, and spreadsheet programs may write `,0`.
 pub fn without_decimals(unknown: &[PairName]) -> BTreeMap<PairName, PairName> {
     let meant = unknown.iter().filter_map(|name| {
         let whole = PairName::new(whole_part(name.as_str())?).ok()?;
@@ -251,8 +251,9 @@ pub fn decimal_names(
 ) -> Option<String> {
     let lines = meant.keys().filter_map(|name| first_lines.get(name));
     let (count, line) = (meant.len(), lines.min()?);
+    let (_, decimals) = whole_and_decimals(meant.keys().next()?.as_str())?;
     Some(format!(
-        "whole numbers that are written with .0: {count}, the first in column \"pair\" on line {line}; they are read without it, as in JSON and XLSX"
+        "whole numbers that are written with {decimals}: {count}, the first in column \"pair\" on line {line}; they are read without it, as in JSON and XLSX"
     ))
 }
 

@@ -22,7 +22,7 @@ use super::row::ReadRows;
 use super::row_reader::{is_blank, row_reader};
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter};
-use super::whole_numbers::WholeNumbers;
+use super::whole_numbers::{MissingWords, WholeNumbers};
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -150,6 +150,13 @@ pub fn read_block_json(bytes: &[u8]) -> Result<ReadBlocks, ManifestError> {
     rows.finish()
 }
 
+/// Columns that may have words for missing values.
+const MISSING_WORDS: MissingWords = MissingWords {
+    names: &["block"],
+    groups: &[],
+    settings: &["unit", "side"],
+};
+
 /// Refuses a line of `blocks.jsonl`: the side and unit that a run found would be stored as given.
 const EXPORTED: &str = "this is a line of an export with results; import your own list of blocks";
 
@@ -173,6 +180,7 @@ impl BlockRows {
     fn push(&mut self, line: usize, mut draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
         if let Ok(draft) = &mut draft {
+            MISSING_WORDS.notice(draft);
             self.read.unnamed.add(line, draft.unnamed);
             self.read.unusual_cells.add(line, &draft.unusual);
             self.read.formula_errors.leave_out(line, &mut draft.meta);

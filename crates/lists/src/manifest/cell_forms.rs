@@ -50,10 +50,14 @@ pub(super) enum CellForm {
     TakesRow,
     /// It begins like a formula.
     Formula,
-    /// It is a whole number with the decimals `.0`, and is read without them.
-    WholeNumber,
+    /// It is a whole number with the decimals `.0` or `,0`, and is read without them.
+    WholeNumber(&'static str),
     /// It is a word for a missing value among whole numbers, and is read as empty.
     MissingValue,
+    /// It is a word for a missing value in a column of settings, and is read as empty.
+    MissingSetting,
+    /// It is a word for a missing value in a column of names, and is kept.
+    MissingName,
 }
 
 impl CellForm {
@@ -115,13 +119,21 @@ impl UnusualCells {
                     "cells that begin with = like formulas: {count}, the first in column {column} on line {line}; they are \
                      kept as they are"
                 ),
-                CellForm::WholeNumber => format!(
-                    "whole numbers that are written with .0: {count}, the first in column {column} on line {line}; they are \
+                CellForm::WholeNumber(decimals) => format!(
+                    "whole numbers that are written with {decimals}: {count}, the first in column {column} on line {line}; they are \
                      read without it, as in JSON and XLSX"
                 ),
                 CellForm::MissingValue => format!(
                     "words for missing values beside whole numbers: {count}, the first in column {column} on line {line}; they \
                      are read as empty cells"
+                ),
+                CellForm::MissingSetting => format!(
+                    "words for missing values: {count}, the first in column {column} on line {line}; they are read as empty \
+                     cells"
+                ),
+                CellForm::MissingName => format!(
+                    "names that are words for missing values: {count}, the first in column {column} on line {line}; they \
+                     are kept, so clear these cells if there is no value"
                 ),
             }
         })

@@ -1,5 +1,6 @@
-//! Ids that a spreadsheet program made of others: it takes `1-11` for a date and `1E5` for a power of ten.
+//! Ids, and names of blocks, that a spreadsheet program made of others: it takes `1-11` for a date and `1E5` for a power of ten.
 
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -40,6 +41,8 @@ pub struct ChangedIds {
     has_plain: bool,
     /// Whether one of them has a year and two numbers.
     has_year: bool,
+    /// The names in such a form that were added, if rows may share one.
+    blocks: Option<BTreeSet<String>>,
 }
 
 /// Ids in a form.
@@ -63,6 +66,14 @@ impl IdsOfForm {
 }
 
 impl ChangedIds {
+    /// Finds blocks of pairs instead of ids. Each counts once.
+    pub fn of_blocks() -> Self {
+        Self {
+            blocks: Some(BTreeSet::new()),
+            ..Self::default()
+        }
+    }
+
     /// Adds the id of a row with the paths of its files.
     pub fn add(&mut self, line: usize, id: &str, files: [&Path; 2]) {
         let Some(form) = SpreadsheetForm::of(id) else {
@@ -70,6 +81,11 @@ impl ChangedIds {
             self.has_year |= has_year_and_two_numbers(id);
             return;
         };
+        if let Some(blocks) = &mut self.blocks
+            && !blocks.insert(id.to_owned())
+        {
+            return;
+        }
         let paths = files.map(|file| file.to_string_lossy().to_lowercase());
         let folded = id.to_lowercase();
         if paths.iter().any(|path| path.contains(&folded)) {
@@ -102,18 +118,31 @@ impl ChangedIds {
         first.sort();
         let (line, id) = first.first()?;
         let id = quoted(id);
-        let advice = "give the column the format Text, correct the ids and save the list again, best as XLSX";
+        let advice = "give the column the format Text, correct its cells and save the list again, best as XLSX";
+        let are_blocks = self.blocks.is_some();
         if count == 1 {
-            return Some(format!(
-                "the id {id} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
-            ));
+            return Some(if are_blocks {
+                format!(
+                    "the block {id} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
+                )
+            } else {
+                format!(
+                    "the id {id} on line {line} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5; {advice}"
+                )
+            });
         }
         let lines = first.iter().take(SHOWN_LINES);
         let lines: Vec<String> = lines.map(|(line, _)| line.to_string()).collect();
         let lines = lines.join(", ");
-        Some(format!(
-            "{count} ids look like dates or powers of ten, such as {id} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
-        ))
+        Some(if are_blocks {
+            format!(
+                "{count} blocks look like dates or powers of ten, such as {id} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
+            )
+        } else {
+            format!(
+                "{count} ids look like dates or powers of ten, such as {id} (lines {lines}): a spreadsheet program may have made them of texts such as 1-11 and 1E5; {advice}"
+            )
+        })
     }
 }
 

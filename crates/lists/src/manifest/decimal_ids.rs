@@ -1,15 +1,15 @@
-//! Ids that differ from another one only by the decimals `.0`, such as `117.0` beside `117`.
+//! Ids that differ from another one only by the decimals `.0` or `,0`, such as `117.0` beside `117`.
 
 use mocban_core::domain::PairName;
 use mocban_core::domain::spelling::quoted;
 
 use super::row::RowIds;
-use super::whole_numbers::whole_part;
+use super::whole_numbers::{whole_and_decimals, whole_part};
 
 /// Largest number of ids that are compared with the others.
 const MAX_IDS: usize = 10_000;
 
-/// The first ids that are whole numbers with `.0`, each with its line.
+/// The first ids that are whole numbers with `.0` or `,0`, each with its line.
 #[derive(Debug, Default)]
 pub struct DecimalIds(Vec<(usize, String)>);
 
@@ -21,7 +21,7 @@ impl DecimalIds {
         }
     }
 
-    /// Returns a warning if the list also has some of them without `.0`.
+    /// Returns a warning if the list also has some of them without these decimals.
     pub fn warning(&self, ids: &RowIds) -> Option<String> {
         let is_doubled = |id: &str| {
             let whole = PairName::new(whole_part(id)?).ok()?;
@@ -29,9 +29,10 @@ impl DecimalIds {
         };
         let mut doubled = self.0.iter().filter(|(_, id)| is_doubled(id) == Some(true));
         let (line, id) = doubled.next()?;
-        let count = 1 + doubled.count();
+        let (_, decimals) = whole_and_decimals(id)?;
+        let count = 1 + doubled.filter(|(_, id)| id.ends_with(decimals)).count();
         Some(format!(
-            "ids that differ from another one only by .0: {count}, the first {} on line {line}; correct them if both mean one",
+            "ids that differ from another one only by {decimals}: {count}, the first {} on line {line}; correct them if both mean one",
             quoted(id)
         ))
     }
@@ -50,6 +51,10 @@ mod tests {
             (
                 "id,mesh,print\n117.0,a,a\n117,b,b\n118.0,c,c\n",
                 Some(expected),
+            ),
+            (
+                "id;mesh;print\n117,0;a;a\n117;b;b\n118,0;c;c\n",
+                Some(&*expected.replace("117.0", "117,0").replace(".0:", ",0:")),
             ),
             ("id,mesh,print\n117.0,a,a\nb,b,b\n", None),
             ("id,mesh,print\n117.0,a,a\n117.00,b,b\n", None),

@@ -8,6 +8,7 @@ use super::cell_forms::CellForm;
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, ReadRows};
+use super::whole_numbers::MissingWords;
 use mocban_core::domain::spelling::{plain_form, quoted};
 use mocban_core::domain::{LengthUnit, PairName, PairNameError, sanitize, value_text};
 
@@ -32,6 +33,13 @@ impl DraftRow {
         }
     }
 }
+
+/// Columns that may have words for missing values.
+const MISSING_WORDS: MissingWords = MissingWords {
+    names: &["id", "character"],
+    groups: &["block"],
+    settings: &["unit", "scanned_face_down"],
+};
 
 /// What is wrong with a path as an id.
 const ID_IS_FILE: &str =
@@ -83,6 +91,7 @@ impl<'e> RowCollector<'e> {
         let mut reasons = Vec::new();
         let row = match draft {
             Ok(Some(mut draft)) => {
+                MISSING_WORDS.notice(&mut draft);
                 self.read.unnamed.add(line, draft.unnamed);
                 self.read.unusual_cells.add(line, &draft.unusual);
                 self.read.formula_errors.leave_out(line, &mut draft.meta);

@@ -54,4 +54,4 @@ pub(crate) use row::{is_id_or_path_column, is_text_column};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 pub use unnamed_values::UnnamedValues;
 pub use unread_columns::UnreadColumns;
-pub use whole_numbers::whole_part;
+pub use whole_numbers::{whole_and_decimals, whole_part};

@@ -1,5 +1,5 @@
-//! Ids of CSV that are whole numbers with the decimals `.0`. Python writes them so if a value of the column is missing, and
-//! may write a word such as `nan` for it.
+//! Ids of CSV that are whole numbers with the decimals `.0` or `,0`. Python writes them so if a value of the column is missing,
+//! and may write a word such as `nan` for it. Spreadsheet programs write a comma in many languages.
 
 use ::csv::ByteRecord;
 use memchr::memmem;
@@ -17,7 +17,13 @@ const NAMES: [&str; 3] = ["id", "block", "character"];
 /// Words that programs for tables write for a missing value.
 const MISSING: [&str; 8] = ["nan", "NaN", "NA", "N/A", "n/a", "<NA>", "None", "null"];
 
-/// Columns of names in which all values are whole numbers with `.0`, or stand for missing values.
+/// Those of them that are no words or initials of any language.
+const NO_NAMES: [&str; 6] = ["NaN", "N/A", "n/a", "<NA>", "None", "null"];
+
+/// Decimals of whole numbers.
+const DECIMALS: [&str; 2] = [".0", ",0"];
+
+/// Columns of names in which all values are whole numbers with the same decimals, or stand for missing values.
 #[derive(Debug, Default)]
 pub(super) struct WholeNumbers(Vec<NameColumn>);
 
@@ -27,6 +33,8 @@ struct NameColumn {
     name: &'static str,
     /// Whether rows may have the same name, or none. Numbers without `.0` may stand beside the others then.
     is_of_groups: bool,
+    /// The decimals of its numbers, once one is found.
+    decimals: Option<&'static str>,
 }
 
 impl WholeNumbers {
@@ -37,7 +45,8 @@ impl WholeNumbers {
         columns: impl Iterator<Item = Option<&'static str>>,
     ) -> Self {
         // Most lists have none, so their rows are not read twice.
-        if memmem::find(list, b".0").is_none() {
+        let of_comma: &[u8] = if delimiter == b',' { b",0\"" } else { b",0" };
+        if memmem::find(list, b".0").is_none() && memmem::find(list, of_comma).is_none() {
             return Self::default();
         }
         let names: Vec<_> = columns.enumerate().collect();
@@ -46,12 +55,13 @@ impl WholeNumbers {
         let names = names.into_iter();
         let names = names.filter_map(|(at, name)| Some((at, name?)));
         let names = names.filter(|(_, name)| NAMES.contains(name));
-        let mut found: Vec<(usize, NameColumn, bool)> = names
-            .map(|(at, name)| {
-                let is_of_groups = has_id && name != "id";
-                (at, NameColumn { name, is_of_groups }, false)
-            })
-            .collect();
+        let column = |name: &'static str| NameColumn {
+            name,
+            is_of_groups: has_id && name != "id",
+            decimals: None,
+        };
+        let mut found: Vec<(usize, NameColumn)> =
+            names.map(|(at, name)| (at, column(name))).collect();
         let mut reader = row_reader(list, delimiter);
         let mut record = ByteRecord::new();
         let mut is_header = true;
@@ -64,22 +74,20 @@ impl WholeNumbers {
             if std::mem::take(&mut is_header) {
                 continue;
             }
-            found.retain_mut(|(at, column, has_numbers)| {
+            found.retain_mut(|(at, column)| {
                 let cell = record.get(*at).unwrap_or_default();
                 let Ok(cell) = std::str::from_utf8(cell) else {
                     return false;
                 };
                 let cell = trimmed(cell);
-                let is_number = whole_part(cell).is_some();
-                *has_numbers |= is_number;
-                is_number
-                    || cell.is_empty()
-                    || MISSING.contains(&cell)
-                    || column.is_of_groups && is_whole(cell)
+                if let Some((_, decimals)) = whole_and_decimals(cell) {
+                    return *column.decimals.get_or_insert(decimals) == decimals;
+                }
+                cell.is_empty() || MISSING.contains(&cell) || column.is_of_groups && is_whole(cell)
             });
         }
-        let found = found.into_iter().filter(|(_, _, has_numbers)| *has_numbers);
-        Self(found.map(|(_, column, _)| column).collect())
+        let found = found.into_iter().map(|(_, column)| column);
+        Self(found.filter(|column| column.decimals.is_some()).collect())
     }
 
     /// Takes the decimals off the numbers of a row in these columns, and words for missing values out of columns whose values
@@ -88,7 +96,10 @@ impl WholeNumbers {
     /// # Errors
     /// Returns an error if a number is too large to be exact, or an id is missing.
     pub(super) fn apply(&self, draft: &mut DraftRow) -> Result<(), String> {
-        for NameColumn { name, is_of_groups } in &self.0 {
+        for column in &self.0 {
+            let NameColumn {
+                name, is_of_groups, ..
+            } = column;
             let Some(cell) = draft.cells.get_mut(name) else {
                 continue;
             };
@@ -104,9 +115,10 @@ impl WholeNumbers {
                 draft.unusual.push((form, (*name).to_owned()));
                 continue;
             }
-            let Some(whole) = whole_part(cell).map(str::to_owned) else {
+            let Some((whole, decimals)) = whole_and_decimals(cell) else {
                 continue;
             };
+            let whole = whole.to_owned();
             let is_exact = whole
                 .parse::<f64>()
                 .is_ok_and(|number| number.abs() < MAX_EXACT);
@@ -115,24 +127,74 @@ impl WholeNumbers {
                 return Err(format!("{name:?}: {error}; write it as text"));
             }
             *cell = whole;
-            draft
-                .unusual
-                .push((CellForm::WholeNumber, (*name).to_owned()));
+            let form = CellForm::WholeNumber(decimals);
+            draft.unusual.push((form, (*name).to_owned()));
         }
         Ok(())
     }
 }
 
-/// Returns a whole number without its decimals, as Python writes it.
+/// Returns a whole number without its decimals, as Python writes it, or with a comma.
 ///
 /// ```
 /// use mocban_lists::manifest::whole_part;
 ///
 /// assert_eq!(whole_part("117.0"), Some("117"));
+/// assert_eq!(whole_part("117,0"), Some("117"));
 /// assert_eq!(whole_part("0117.0"), None);
 /// ```
 pub fn whole_part(text: &str) -> Option<&str> {
-    text.strip_suffix(".0").filter(|whole| is_whole(whole))
+    whole_and_decimals(text).map(|(whole, _)| whole)
+}
+
+/// Returns a whole number like [`whole_part`], and its decimals: `.0` or `,0`.
+pub fn whole_and_decimals(text: &str) -> Option<(&str, &'static str)> {
+    let mut found = DECIMALS.iter().filter_map(|decimals| {
+        let whole = text.strip_suffix(decimals)?;
+        is_whole(whole).then_some((whole, *decimals))
+    });
+    found.next()
+}
+
+/// Names and settings of a row that are words for missing values.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MissingWords {
+    /// Columns of names that every row needs, and of characters.
+    pub(super) names: &'static [&'static str],
+    /// Columns of names that rows may lack.
+    pub(super) groups: &'static [&'static str],
+    /// Columns of a few known values.
+    pub(super) settings: &'static [&'static str],
+}
+
+impl MissingWords {
+    /// Notices such words in a row. Takes those out of the columns of settings, where they can mean nothing else.
+    pub(super) fn notice(self, draft: &mut DraftRow) {
+        let is_missing = |cell: &String, words: &[&str]| words.contains(&cell.as_str());
+        for column in self.settings {
+            if draft
+                .cells
+                .get(column)
+                .is_some_and(|cell| is_missing(cell, &MISSING))
+            {
+                draft.cells.remove(column);
+                let form = CellForm::MissingSetting;
+                draft.unusual.push((form, (*column).to_owned()));
+            }
+        }
+        for (columns, words) in [(self.names, &NO_NAMES[..]), (self.groups, &MISSING[..])] {
+            for column in columns {
+                if draft
+                    .cells
+                    .get(column)
+                    .is_some_and(|cell| is_missing(cell, words))
+                {
+                    let form = CellForm::MissingName;
+                    draft.unusual.push((form, (*column).to_owned()));
+                }
+            }
+        }
+    }
 }
 
 /// Returns whether a text is a whole number as Python writes it.
@@ -181,6 +243,45 @@ mod tests {
     }
 
     #[test]
+    fn a_column_of_whole_numbers_with_a_decimal_comma_is_read_without() {
+        let warning = "whole numbers that are written with ,0: 3, the first in column \"id\" on line 2; they are read without it, as in \
+            JSON and XLSX";
+        for list in [
+            "id;mesh;print;block\n117,0;a;a;4,0\n118,0;b;b;\n",
+            "id,mesh,print,block\n\"117,0\",a,a,\"4,0\"\n\"118,0\",b,b,\n",
+        ] {
+            let (ids, warnings) = read(list);
+            assert_eq!(ids, ["117", "118"], "{list}");
+            assert_eq!(warnings, [warning], "{list}");
+        }
+        let rows = parse_csv(b"id;mesh;print;block\n117,0;a;a;4,0\n").expect("a list");
+        assert_eq!(rows[0].block.as_deref(), Some("4"));
+    }
+
+    #[test]
+    fn words_for_missing_values_are_no_settings_and_unusual_names() {
+        let list = "id,mesh,print,block,character,unit\nA,a,a,B1,nan,mm\nB,b,b,nan,None,nan\nNaN,c,c,NA,x,\n";
+        let rows = parse_csv(list.as_bytes()).expect("a list");
+        assert_eq!(rows[1].unit, None);
+        assert_eq!(rows[1].block.as_deref(), Some("nan"), "kept");
+        let (ids, warnings) = read(list);
+        assert_eq!(ids, ["A", "B", "NaN"]);
+        assert_eq!(
+            warnings,
+            [
+                "words for missing values: 1, the first in column \"unit\" on line 3; they are read as empty cells",
+                "names that are words for missing values: 4, the first in column \"character\" on line 3; they are kept, so \
+                 clear these cells if there is no value"
+            ]
+        );
+        let read = read_blocks(b"block,mesh,page,unit,side\nB,a,a,None,null\n").expect("a list");
+        assert_eq!((read.rows[0].unit, read.rows[0].side), (None, None));
+        assert!(read.warnings[0].starts_with("words for missing values: 2"));
+        let read = read_blocks(b"block,mesh,page\nNA,a,a\nNB,b,b\n").expect("a list");
+        assert_eq!(read.warnings, [""; 0], "initials");
+    }
+
+    #[test]
     fn a_column_with_other_values_stays_as_it_is() {
         for ids in [
             ["117.0", "117"],
@@ -188,13 +289,14 @@ mod tests {
             ["117.0", "a"],
             ["117.0", "0118.0"],
             ["117.0", "118.00"],
+            ["117.0", "\"118,0\""],
             ["117.0", "=\"118.0\""],
             ["1.0.0", "x.0"],
             ["-0.0", "-.0"],
         ] {
             let rows = ids.map(|id| format!("{id},m,p\n"));
             let (read, warnings) = read(&format!("id,mesh,print\n{}", rows.concat()));
-            let expected = ids.map(|id| id.trim_start_matches("=\"").trim_end_matches('"'));
+            let expected = ids.map(|id| id.trim_start_matches('=').trim_matches('"'));
             assert_eq!(read, expected);
             assert_eq!(warnings, [""; 0]);
         }

@@ -131,12 +131,20 @@ pub(super) const BLOCK_MESSAGES: &[(&str, &str)] = &[
         "mã {0} ở dòng {1} trông như ngày tháng hoặc lũy thừa của mười: có thể chương trình bảng tính đã đổi nó từ một văn bản như 1-11 hoặc 1E5",
     ),
     (
+        "the block {} on line {} looks like a date or a power of ten: a spreadsheet program may have made it of a text such as 1-11 or 1E5",
+        "ván {0} ở dòng {1} trông như ngày tháng hoặc lũy thừa của mười: có thể chương trình bảng tính đã đổi nó từ một văn bản như 1-11 hoặc 1E5",
+    ),
+    (
+        "{} blocks look like dates or powers of ten, such as {} (lines {}): a spreadsheet program may have made them of texts such as 1-11 and 1E5",
+        "{0#} ván trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn {1} (dòng {2}): có thể chương trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5",
+    ),
+    (
         "{} ids look like dates or powers of ten, such as {} (lines {}): a spreadsheet program may have made them of texts such as 1-11 and 1E5",
         "{0#} mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn {1} (dòng {2}): có thể chương trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5",
     ),
     (
-        "give the column the format Text, correct the ids and save the list again, best as XLSX",
-        "hãy đặt định dạng Văn bản cho cột, sửa lại các mã rồi lưu lại danh sách, tốt nhất là XLSX",
+        "give the column the format Text, correct its cells and save the list again, best as XLSX",
+        "hãy đặt định dạng Văn bản cho cột, sửa lại các ô của cột rồi lưu lại danh sách, tốt nhất là XLSX",
     ),
     // Damaged rows of the catalog.
     (

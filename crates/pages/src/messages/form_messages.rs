@@ -106,6 +106,14 @@ pub(super) const FORM_MESSAGES: &[(&str, &str)] = &[
         "hãy cho phép đọc chúng trước khi chạy",
     ),
     (
+        "files that have only zeros, as interrupted copies may: {}, the first {}",
+        "số tệp chỉ có byte 0, như khi việc chép bị gián đoạn: {0#}, tệp đầu tiên là {1}",
+    ),
+    (
+        "copy them again before the run",
+        "hãy chép lại các tệp đó trước khi chạy",
+    ),
+    (
         "files that are pointers of Git LFS and do not hold scans, prints or labels: {}, the first {}",
         "số tệp là con trỏ của Git LFS, không chứa bản quét, bản in hay nhãn: {0#}, tệp đầu tiên là {1}",
     ),

@@ -25,8 +25,12 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "hãy dùng chương trình bảng tính lưu bảng thành XLSX hoặc \"CSV UTF-8\"",
     ),
     (
-        "it seems to be GB 18030 (Chinese)",
-        "có vẻ là GB 18030 (tiếng Trung)",
+        "save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "an encoding of Chinese, Japanese or Korean, such as GB 18030 or EUC-KR",
+        "một bảng mã tiếng Trung, tiếng Nhật hoặc tiếng Hàn, chẳng hạn GB 18030 hoặc EUC-KR",
     ),
     (
         "it seems to be Windows-1258 (Vietnamese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
@@ -37,8 +41,12 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "có vẻ là Windows-1252 (Tây Âu): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
     ),
     (
-        "it seems to be GB 18030 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
-        "có vẻ là GB 18030 (tiếng Trung): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+        "it seems to be an encoding of Chinese, Japanese or Korean, such as GB 18030 or EUC-KR: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là một bảng mã tiếng Trung, tiếng Nhật hoặc tiếng Hàn, chẳng hạn GB 18030 hoặc EUC-KR: hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
+    ),
+    (
+        "it seems to be EUC-JP (Japanese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+        "có vẻ là EUC-JP (tiếng Nhật): hãy lưu danh sách ở dạng UTF-8 (trong Excel: Lưu thành, \"CSV UTF-8\")",
     ),
     (
         "it seems to be Big5 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
@@ -282,8 +290,8 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
         "số {0} quá lớn nên có thể không đúng từng chữ số",
     ),
     (
-        "whole numbers that are written with .0: {}, the first in column {} on line {}",
-        "số ô là số nguyên nhưng có phần .0: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+        "whole numbers that are written with {}: {}, the first in column {} on line {}",
+        "số ô là số nguyên nhưng có phần {0}: {1#}, ô đầu tiên ở cột {2}, dòng {3}",
     ),
     (
         "they are read without it, as in JSON and XLSX",
@@ -295,13 +303,33 @@ pub(super) const LIST_MESSAGES: &[(&str, &str)] = &[
     ),
     ("they are read as empty cells", "chúng được đọc như ô trống"),
     (
+        "words for missing values: {}, the first in column {} on line {}",
+        "số ô có từ chỉ giá trị thiếu: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    (
+        "names that are words for missing values: {}, the first in column {} on line {}",
+        "số ô tên có từ chỉ giá trị thiếu: {0#}, ô đầu tiên ở cột {1}, dòng {2}",
+    ),
+    (
+        "they are kept, so clear these cells if there is no value",
+        "chúng được giữ nguyên, vì vậy hãy xóa nội dung các ô này nếu không có giá trị",
+    ),
+    (
+        "micrometres ({}) are not read",
+        "không đọc được micrômét ({0})",
+    ),
+    (
+        "divide the coordinates by 1000 and use mm",
+        "hãy chia tọa độ cho 1000 và dùng mm",
+    ),
+    (
         "column {} has {}, a word for a missing value",
         "cột {0} có {1}, là từ chỉ giá trị thiếu",
     ),
     ("write the name", "hãy ghi tên"),
     (
-        "ids that differ from another one only by .0: {}, the first {} on line {}",
-        "số mã chỉ khác một mã khác ở phần .0: {0#}, mã đầu tiên là {1}, ở dòng {2}",
+        "ids that differ from another one only by {}: {}, the first {} on line {}",
+        "số mã chỉ khác một mã khác ở phần {0}: {1#}, mã đầu tiên là {2}, ở dòng {3}",
     ),
     (
         "correct them if both mean one",

@@ -243,6 +243,25 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "the {} cannot be decoded: {}",
         "không giải mã được {0}: {!1}",
     ),
+    ("the {} is damaged", "{0} bị hỏng"),
+    (
+        "copy it again, or open it in another program and save it as PNG (the decoder found: {})",
+        "hãy chép lại, hoặc mở bằng chương trình khác rồi lưu thành PNG (bộ giải mã thấy: {!0})",
+    ),
+    ("the file has only zeros", "tệp chỉ có byte 0"),
+    ("{} has only zeros", "{0} chỉ có byte 0"),
+    (
+        "was the copy interrupted? copy it again",
+        "việc chép có bị gián đoạn không? hãy chép lại",
+    ),
+    (
+        "line {} says that {} points follow, but {} do",
+        "dòng {0} cho biết có {1#} điểm tiếp theo, nhưng chỉ có {2#}",
+    ),
+    (
+        "copy the file again if it was cut, or correct the number",
+        "hãy chép lại tệp nếu tệp bị cắt cụt, hoặc sửa lại con số",
+    ),
     ("it has no image", "tệp không có hình"),
     ("one of its colours is missing", "thiếu một thành phần màu"),
     (
@@ -258,7 +277,6 @@ pub(super) const PAIR_REFUSALS: &[(&str, &str)] = &[
         "các điểm ảnh dùng chung mẫu màu theo cách không thông dụng",
     ),
     ("save it as RGB", "hãy lưu thành RGB"),
-    ("its {} data are damaged", "dữ liệu {0} bị hỏng"),
     ("artifact {} is missing", "thiếu tệp kết quả {0}"),
     (
         "artifact {} was changed: its bytes do not match its name",

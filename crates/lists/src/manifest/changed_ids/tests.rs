@@ -27,7 +27,7 @@ fn several_dates_and_powers_among_other_ids_are_counted() {
         found.as_deref(),
         Some(
             "4 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may have made \
-             them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and save the list again, best \
+             them of texts such as 1-11 and 1E5; give the column the format Text, correct its cells and save the list again, best \
              as XLSX"
         )
     );
@@ -104,6 +104,32 @@ fn real_ids_are_left_alone() {
     ] {
         assert_eq!(warning(rows), None, "{rows:?}");
     }
+}
+
+#[test]
+fn blocks_that_rows_share_count_once() {
+    let mut blocks = ChangedIds::of_blocks();
+    let mut add = |line, block| blocks.add(line, block, ["a.stl", "a.png"].map(Path::new));
+    for line in 2..6 {
+        add(line, "1.23457E+11");
+        add(line, "B");
+    }
+    let found = blocks.warning().expect("a warning");
+    let start = "the block \"1.23457E+11\" on line 2 looks like a date or a power of ten: ";
+    assert!(found.starts_with(start), "{found}");
+    let mut dates = ChangedIds::of_blocks();
+    for (line, block) in [(2, "1-Nov"), (3, "1-Nov"), (4, "x")] {
+        dates.add(line, block, ["a.stl", "a.png"].map(Path::new));
+    }
+    assert_eq!(dates.warning(), None, "one block may be so named");
+    dates.add(5, "2-Nov", ["a.stl", "a.png"].map(Path::new));
+    let found = dates.warning().expect("a warning");
+    assert!(
+        found.starts_with(
+            "2 blocks look like dates or powers of ten, such as \"1-Nov\" (lines 2, 5): "
+        ),
+        "{found}"
+    );
 }
 
 #[test]

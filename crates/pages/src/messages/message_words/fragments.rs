@@ -3,6 +3,7 @@
 /// Literals that are parts of sentences, or no messages: names of columns, values and notes of the code.
 pub(super) const FRAGMENTS: &[&str] = &[
     "the file {}",
+    "the file {ONLY_ZEROS}",
     "have the same name (upper and lower case, accents and blanks do not count)",
     "columns {first} and {second}, {shown} and {shown_other}, {HAVE_SAME_NAME}; rename one of them",
     "the keys {one} and {other} {HAVE_SAME_NAME}; leave one of them out",
@@ -88,7 +89,7 @@ pub(super) const FRAGMENTS: &[&str] = &[
     "its prints have names of images",
     "its pages have no names of images",
     "id or print",
-    "; it seems to be {name}: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+    "; it seems to be {name}: {SAVE}",
     "cell {cell} of column \"{}\" is {kind}, {}; the spreadsheet program may have made it of a text such as {example}; give the column the format Text and write the cell again",
     "a power of ten",
     "it has more than {limit} {what}",
@@ -168,7 +169,7 @@ pub(super) const SENTENCES: &[&str] = &[
     "b.json: box 3: y_max is missing; correct or remove it",
     "b.json: box 3: cx is missing; correct or remove it",
     "the list is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
-    "line 2: the cell of column \"id\" is not UTF-8; it seems to be GB 18030 (Chinese): save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
+    "line 2: the cell of column \"id\" is not UTF-8; it seems to be an encoding of Chinese, Japanese or Korean, such as GB 18030 or EUC-KR: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")",
     "  lines 2-4 and 9 more: mesh is empty",
     "  line 2: print is empty",
     "  line 2: page is empty",

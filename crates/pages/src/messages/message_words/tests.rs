@@ -247,11 +247,11 @@ fn moved_inputs_are_explained() {
 #[test]
 fn ids_that_a_spreadsheet_changed_are_explained() {
     let english = "3 ids look like dates or powers of ten, such as \"1-Nov\" (lines 2, 4, 5): a spreadsheet program may \
-                   have made them of texts such as 1-11 and 1E5; give the column the format Text, correct the ids and \
+                   have made them of texts such as 1-11 and 1E5; give the column the format Text, correct its cells and \
                    save the list again, best as XLSX";
     let expected = "3 mã trông như ngày tháng hoặc lũy thừa của mười, chẳng hạn \"1-Nov\" (dòng 2, 4, 5): có thể chương \
                     trình bảng tính đã đổi chúng từ các văn bản như 1-11 và 1E5; hãy đặt định dạng Văn bản cho cột, sửa \
-                    lại các mã rồi lưu lại danh sách, tốt nhất là XLSX";
+                    lại các ô của cột rồi lưu lại danh sách, tốt nhất là XLSX";
     assert_translated(&[(english, expected)]);
 }
 
