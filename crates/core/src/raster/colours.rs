@@ -34,6 +34,9 @@ impl Colours {
         channels: usize,
         samples: Vec<u8>,
     ) -> Option<Self> {
+        if samples.len() != width * height * channels {
+            return None;
+        }
         if channels == 1 {
             return Grid::from_vec(width, height, samples).map(Self::Grey8);
         }
@@ -223,7 +226,7 @@ mod tests {
         let colours = of(3, &[1, 2, 3, 4, 5, 6]).expect("two colours");
         assert_eq!(colours.at(1, 0), [4 * 257, 5 * 257, 6 * 257]);
         assert_eq!(of(1, &[7, 9]).expect("two greys").at(1, 0), [9 * 257; 3]);
-        for (channels, count) in [(1, 3), (3, 5), (3, 9)] {
+        for (channels, count) in [(1, 3), (3, 5), (3, 7), (3, 9)] {
             assert!(of(channels, &vec![0; count]).is_none());
         }
     }

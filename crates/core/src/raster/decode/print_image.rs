@@ -62,7 +62,7 @@ pub(super) fn colours_on_white(image: DynamicImage) -> Colours {
     let size = [image.width() as usize, image.height() as usize];
     let narrow = |channels, samples| {
         let colours = Colours::of_samples(size, channels, samples);
-        colours.expect("as many samples as pixels")
+        colours.expect("samples for each pixel")
     };
     match image {
         DynamicImage::ImageLuma8(image) => narrow(1, image.into_raw()),

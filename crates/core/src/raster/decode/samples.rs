@@ -70,14 +70,13 @@ impl PrintSamples {
     /// Returns the image, as if the samples were read from a file. Transparent pixels are composited on white.
     pub fn to_image(&self) -> PrintImage {
         let [width, height] = self.size;
-        let narrow = |samples: &[u8]| {
+        if let SampleVec::Eight(samples) = &self.samples
+            && self.channels % 2 == 1
+        {
             let colours = Colours::of_samples(self.size, self.channels, samples.to_vec());
-            colours.expect("as many samples as pixels").into()
-        };
-        let mut rgb = match &self.samples {
-            SampleVec::Eight(samples) if self.channels % 2 == 1 => return narrow(samples),
-            _ => Grid::new(width, height, [u16::MAX; 3]),
-        };
+            return colours.expect("samples for each pixel").into();
+        }
+        let mut rgb = Grid::new(width, height, [u16::MAX; 3]);
         match &self.samples {
             SampleVec::Eight(samples) => widen_to(&mut rgb, samples, self.channels, widen),
             SampleVec::Sixteen(samples) => {
