@@ -57,6 +57,9 @@ pub fn reduce(rgb: &Colours, times: u32) -> Grid<[u16; 3]> {
     }
 }
 
+/// Pixels whose levels are added in 32 bits, which hold the sum of as many of the largest levels.
+const PIXELS_PER_SUM: usize = 1 << 16;
+
 /// Returns the means, rounded, of squares of `times` by `times` pixels. `levels` returns the levels of a pixel.
 fn square_means<T: Copy, const N: usize>(
     grid: &Grid<T>,
@@ -73,15 +76,16 @@ fn square_means<T: Copy, const N: usize>(
         let rows = top..grid.height().min(top + side);
         for y in rows.clone() {
             for (sum, square) in sums.iter_mut().zip(grid.row(y).chunks(side)) {
-                // A row of a square has at most 65,536 pixels of the longest image that is read.
-                let mut row = [0_u32; N];
-                for pixel in square {
-                    for (sum, level) in row.iter_mut().zip(levels(*pixel)) {
-                        *sum += u32::from(level);
+                for part in square.chunks(PIXELS_PER_SUM) {
+                    let mut row = [0_u32; N];
+                    for pixel in part {
+                        for (sum, level) in row.iter_mut().zip(levels(*pixel)) {
+                            *sum += u32::from(level);
+                        }
                     }
-                }
-                for (sum, row) in sum.iter_mut().zip(row) {
-                    *sum += u64::from(row);
+                    for (sum, row) in sum.iter_mut().zip(row) {
+                        *sum += u64::from(row);
+                    }
                 }
             }
         }
