@@ -146,6 +146,7 @@ fn the_print_registers_with_the_relief() {
     let map = ExportedMap::read(dir.path(), pair);
     let print = std::fs::read(print_file(dir.path(), pair)).expect("the print");
     let print = decode(&print, &ImageLimits::SUGGESTED).expect("an image");
+    let print = print.rgb.to_rgb16();
     let page = view(dir.path(), pair);
     let tab = mounted(&browser, &page.url, [900, 700]);
     for (as_printed, turn) in [(true, "0, 0"), (false, "25, -12")] {
@@ -159,7 +160,7 @@ fn the_print_registers_with_the_relief() {
             let pixel = numbers(&vertex["pixel"]);
             let distance = (pixel[0] - expected[0]).hypot(pixel[1] - expected[1]);
             assert!(distance < 1.0, "{vertex}: {expected:?}");
-            let Some(colour) = uniform_colour(&print.rgb.to_rgb16(), expected) else {
+            let Some(colour) = uniform_colour(&print, expected) else {
                 continue;
             };
             let shown = numbers(&vertex["colour"]);
