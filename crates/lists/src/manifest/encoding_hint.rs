@@ -58,8 +58,8 @@ const VIETNAMESE: [u8; 46] = [
     0xf9, 0xfa, 0xfd, 0x91, 0x92, 0x93, 0x94, 0x96, 0x97, 0xa0, 0xab, 0xbb, 0xb0, 0xb7,
 ];
 
-/// Returns whether lines are Vietnamese in Windows-1258: they have no other bytes, and a tone mark behind a vowel besides
-/// another one or a letter with a hook or a bar. Words of other languages have one of these by chance.
+/// Returns whether lines are Vietnamese in Windows-1258: they have only its bytes, and behind vowels two different tone marks,
+/// or one beside a letter with a hook or a bar. Words of other languages may have a single one by chance.
 fn is_vietnamese(lines: &[&[u8]]) -> bool {
     let is_used = |byte: &u8| byte.is_ascii() || VIETNAMESE.contains(byte);
     if !lines.iter().all(|line| line.iter().all(is_used)) {
@@ -88,8 +88,8 @@ const WESTERN_LETTERS: [u8; 34] = [
     0xf7, 0xc6,
 ];
 /// Signs of Windows-1252 that follow words, and signs that precede words.
-const CLOSING_SIGNS: [u8; 12] = [
-    0x85, 0x92, 0x94, 0x99, 0xa0, 0xa9, 0xae, 0xb0, 0xb7, 0xbb, 0xb2, 0xb3,
+const CLOSING_SIGNS: [u8; 11] = [
+    0x85, 0x94, 0x99, 0xa0, 0xa9, 0xae, 0xb0, 0xb7, 0xbb, 0xb2, 0xb3,
 ];
 const OPENING_SIGNS: [u8; 6] = [0x80, 0x91, 0x93, 0xa7, 0xab, 0xb5];
 
@@ -101,7 +101,8 @@ fn is_western(lines: &[&[u8]]) -> bool {
         let (byte, next) = (line[at], line.get(at + 1));
         let before = at.checked_sub(1).map(|before| &line[before]);
         match byte {
-            0x96 | 0x97 => true,
+            // Dashes and apostrophes.
+            0x92 | 0x96 | 0x97 => true,
             // Vietnamese in VNI has a circumflex of its own behind vowels.
             0xe2 => !before.is_some_and(|before| b"aeo".contains(before)),
             _ if WESTERN_LETTERS.contains(&byte) => {
@@ -109,7 +110,6 @@ fn is_western(lines: &[&[u8]]) -> bool {
                 !(before.is_some_and(|byte| *byte >= 0xc0)
                     && next.is_some_and(|byte| *byte >= 0xc0))
             }
-            0x92 => true,
             _ if CLOSING_SIGNS.contains(&byte) => !is_letter(next),
             _ => OPENING_SIGNS.contains(&byte) && !is_letter(before),
         }
@@ -123,7 +123,7 @@ fn is_western(lines: &[&[u8]]) -> bool {
 
 /// Fewest bytes of characters by which an encoding of two bytes each is recognized.
 const FEWEST_BYTES: usize = 4;
-/// What encodings are called that share their bytes.
+/// Names encodings that share their bytes.
 const EAST_ASIAN: &str = "an encoding of Chinese, Japanese or Korean, such as GB 18030 or EUC-KR";
 
 /// Returns the name of the two-byte encoding in which all lines are text, if there is one.
@@ -162,7 +162,8 @@ fn two_byte_encoding(lines: &[&[u8]]) -> Option<&'static str> {
     ((is_double || is_long) && is_east_asian(lines)).then_some(EAST_ASIAN)
 }
 
-/// Returns whether lines have bytes that most texts of two-byte characters have, but no letters of Cyrillic or Greek.
+/// Returns whether lines have enough bytes above ASCII, and one that most texts of two-byte characters have but few letters of
+/// Cyrillic or Greek.
 fn is_east_asian(lines: &[&[u8]]) -> bool {
     let bytes = || {
         lines
