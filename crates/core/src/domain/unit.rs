@@ -26,7 +26,8 @@ enum_names! { pub LengthUnit, "a unit":
 
 /// Letters of the longest name whose blanks and hyphens count.
 const SHORT_NAME: usize = 4;
-/// Long names of units in plain form, in the languages of those who scan woodblocks. Other names are in [`MICROMETRES`].
+/// Long names of units in plain form, in the languages of those who scan woodblocks. Those of micrometres are in
+/// [`MICROMETRES`].
 const LONG_NAMES: [(LengthUnit, &[&str]); 4] = [
     (
         LengthUnit::Mm,
@@ -77,7 +78,7 @@ const LONG_NAMES: [(LengthUnit, &[&str]); 4] = [
     ),
 ];
 
-/// Names of thousandths of a millimetre, which no unit is.
+/// Names of micrometres, in plain form. They are recognized, but no mesh is read in this unit.
 const MICROMETRES: [&str; 17] = [
     "um",
     "µm",

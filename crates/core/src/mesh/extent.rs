@@ -202,7 +202,7 @@ fn each_position(
                 has_faces |= is_face_of_obj(line);
             };
             lines.visit(file, spread, &mut visit_line)?;
-            // Few faces may be between all places, and are nearly always at the end.
+            // The places that are read may miss a few faces, which are nearly always at the end.
             lines.at_end().visit(file, END_OF_FILE, |line| {
                 has_faces |= is_face_of_obj(line);
             })?;
@@ -325,7 +325,7 @@ struct TextLines {
 }
 
 impl TextLines {
-    /// Returns the last lines, as many as [`END_OF_FILE`] reads.
+    /// Returns the lines at the end, of which [`END_OF_FILE`] reads all.
     fn at_end(self) -> Self {
         let start = self.end.saturating_sub(END_OF_FILE.bytes).max(self.start);
         Self { start, ..self }

@@ -66,9 +66,9 @@ impl FarValues {
 }
 
 /// Finds what stands for missing positions: a number far outside of the box around the other vertices that many vertices
-/// have, exactly, along an axis. If there is none, a height that usually stands for a missing one may
-/// be nearer: -99, -999 and so on, and 0 in points without faces. Vertices that are no positions, as `is_position` says, do
-/// not count. `extremes` are vertices that may be far outside.
+/// have, exactly, along an axis. If there is none, a height that usually stands for a missing one may be nearer: -99, -999 and
+/// so on, and 0 in points without faces. Vertices that are no positions, as `is_position` says, do not count. `extremes` are
+/// vertices that may be far outside.
 pub(super) fn find_far_values(
     vertices: &Vertices,
     kind: VertexKind,

@@ -146,7 +146,7 @@ fn positions(
 /// the number may be one of something else.
 ///
 /// # Errors
-/// Returns an error that names the line of the last scan.
+/// Returns an error that names the line with the number of the last scan.
 fn check_stated(bytes: &[u8], points: u64) -> Result<(), MeshError> {
     // Points with quotation marks may have no such layout.
     let Ok(layout) = PointLayout::of(bytes) else {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::{Grid, PixelBox};
 
-/// Colours of an image in 16-bit red, green and blue. Levels of 8 bits are multiplied by 257 when they are read, so that
+/// Colours of an image, which are read as red, green and blue in 16 bits. Levels of 8 bits are multiplied by 257 when they are read, so that
 /// white is always 65535.
 #[derive(Debug, Clone)]
 pub enum Colours {
@@ -152,7 +152,7 @@ impl Colours {
     }
 }
 
-/// Colours are equal if they are in 16 bits, however many bytes they take.
+/// Compares the colours in 16 bits, so that equal colours in different forms are equal.
 impl PartialEq for Colours {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {

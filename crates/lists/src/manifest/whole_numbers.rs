@@ -17,7 +17,7 @@ const NAMES: [&str; 3] = ["id", "block", "character"];
 /// Words that programs for tables write for a missing value.
 const MISSING: [&str; 8] = ["nan", "NaN", "NA", "N/A", "n/a", "<NA>", "None", "null"];
 
-/// Those of them that are no words or initials of any language.
+/// The words of [`MISSING`] that are unlikely names of pairs and characters. Others, such as `NA`, may be initials.
 const NO_NAMES: [&str; 6] = ["NaN", "N/A", "n/a", "<NA>", "None", "null"];
 
 /// Decimals of whole numbers.
@@ -168,7 +168,7 @@ pub(super) struct MissingWords {
 }
 
 impl MissingWords {
-    /// Notices such words in a row. Takes those out of the columns of settings, where they can mean nothing else.
+    /// Notices such words in a row. Removes them from the columns of settings, where they can mean nothing else.
     pub(super) fn notice(self, draft: &mut DraftRow) {
         let is_missing = |cell: &String, words: &[&str]| words.contains(&cell.as_str());
         for column in self.settings {

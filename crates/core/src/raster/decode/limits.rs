@@ -10,7 +10,8 @@ use super::DecodeError;
 pub struct ImageLimits {
     /// Largest file in bytes. 256 MiB is generous for one character.
     pub max_bytes: u64,
-    /// Largest width times height in pixels. 100 million pixels are decoded to 600 MB.
+    /// Largest width times height in pixels. 100 million pixels are decoded to 600 MB or, in 8 bits,
+    /// to 100 MB (grey) or 300 MB.
     pub max_pixels: u64,
 }
 
