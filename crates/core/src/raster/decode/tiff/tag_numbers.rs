@@ -19,7 +19,7 @@ pub(super) fn values<'b>(
 ) -> Result<Option<TagValues<'b>>, DecodeError> {
     match page.values(tag) {
         None if page.has(tag) => {
-            let found = format!("values of its tag {tag} outside of the file");
+            let found = format!("unreadable values of its tag {tag}");
             Err(damaged(FileKind::Tiff, &found))
         }
         values => Ok(values),
