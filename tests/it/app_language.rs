@@ -104,6 +104,7 @@ fn what_was_typed_stays_on_the_way_back_and_in_the_other_language() {
     tab.wait(&on_page("/blocks"));
     tab.click("nav a[href$='/review']", false);
     tab.wait(&on_page("/review"));
-    tab.wait("document.readyState === 'complete'");
+    // What was typed would be restored when the page has loaded.
+    tab.wait("performance.getEntriesByType('navigation')[0].loadEventEnd > 0");
     assert_eq!(tab.eval("document.querySelector('#reviewer').value"), "");
 }
