@@ -206,8 +206,6 @@ impl OneFileRows {
 mod tests {
     use std::path::PathBuf;
 
-    use super::OneFileRows;
-
     use crate::manifest_file::Listing;
     use crate::pair_choices::PairChoices;
     use mocban_lists::manifest::PairingChanges;
@@ -282,6 +280,8 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_file_that_is_mesh_and_print_is_named_under_other_paths() {
+        use super::OneFileRows;
+
         let dir = tempfile::tempdir().expect("a temporary directory");
         let place = |name: &str| dir.path().join(name);
         for (name, content) in [("a.stl", "mesh"), ("a.png", "png"), ("b.png", "mesh")] {
