@@ -51,10 +51,11 @@
 //! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
 //!
 //! Read 18 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
-//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in its folder `queue` the files `kind.rs`, `lease.rs`,
-//! `claim.rs`, `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
-//! `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Leases are also taken away by the start of a
-//! run (`run.rs`), and in the catalog by `jobs/requeue.rs` (`send_back`), `jobs/retired.rs`, `audit/repair.rs` and `blocks/cut.rs`.
+//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in its folder `queue` the files `kind.rs`,
+//! `lease.rs`, `claim.rs`, `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL
+//! `commit/write_connection.rs`, `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Leases are also taken
+//! away by the start of a run (`run.rs`), and in the catalog by `jobs/requeue.rs` (`send_back`), `jobs/retired.rs`,
+//! `audit/repair.rs` and `blocks/cut.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
 //! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use super::{Grid, PixelBox};
 
-/// Colours of an image, which are read as red, green and blue in 16 bits. Levels of 8 bits are multiplied by 257 when they are read, so that
-/// white is always 65535.
+/// Colours of an image, which are read as red, green and blue in 16 bits. Levels of 8 bits are multiplied by 257 when they
+/// are read, so that white is always 65535.
 #[derive(Debug, Clone)]
 pub enum Colours {
     /// Levels of grey in 8 bits.
