@@ -113,19 +113,30 @@ pub(super) fn find_far_values(
 }
 
 /// Returns the numbers at the ends of a sample that are far outside of the box around its other vertices. Along x and y, those
-/// of vertices that are far along an earlier axis are left out.
+/// of vertices that are far along an earlier axis are left out, and those of vertices at several positions count only if they
+/// usually stand for missing ones: the straight edge of a plate may be far from a fine relief.
 fn outside(sample: &[[f64; 3]], ranges: &AxisRanges) -> Vec<FarValue> {
     let mut found: Vec<FarValue> = Vec::new();
     for axis in [2, 0, 1] {
         for value in ranges.far_ends(axis) {
-            let value = FarValue { axis, value };
-            let mut vertices = sample.iter().filter(|vertex| value.is_at(**vertex));
-            if vertices.any(|vertex| found.iter().all(|other| !other.is_at(*vertex))) {
-                found.push(value);
+            let far = FarValue { axis, value };
+            let vertices: Vec<_> = sample.iter().filter(|vertex| far.is_at(**vertex)).collect();
+            let is_alone = vertices.windows(2).all(|two| two[0] == two[1]);
+            let is_new = |vertex: &&[f64; 3]| found.iter().all(|other| !other.is_at(**vertex));
+            let is_placeholder = axis == 2 || is_alone || is_usual(value);
+            if is_placeholder && vertices.iter().any(is_new) {
+                found.push(far);
             }
         }
     }
     found
+}
+
+/// Returns whether a number usually stands for a missing one: a height of [`KNOWN_HEIGHTS`], a power of ten, or one less.
+fn is_usual(number: f64) -> bool {
+    let size = number.abs();
+    let is_power = |size: f64| size >= 1e4 && size.log10().fract() == 0.0;
+    KNOWN_HEIGHTS.contains(&size) || is_power(size) || is_power(size + 1.0)
 }
 
 /// The inner ranges along the axes.
@@ -329,6 +340,19 @@ mod tests {
         let len = bytes.len() as u64;
         let read = read_from(&mut bytes.as_slice(), len, "a.stl", &MeshLimits::SUGGESTED);
         read.expect("reads")
+    }
+
+    #[test]
+    fn the_edges_of_a_plate_around_a_fine_relief_stay() {
+        let edges = [-600.0, 600.0].map(|x| (0..40).map(move |k| [x, 0.5 * f64::from(k), 0.0]));
+        let edges: Vec<[f64; 3]> = edges.into_iter().flatten().collect();
+        assert_eq!(found(&edges), []);
+        let missing: Vec<[f64; 3]> = edges.iter().map(|[_, y, z]| [-9999.0, *y, *z]).collect();
+        let wanted = [FarValue {
+            axis: 0,
+            value: -9999.0,
+        }];
+        assert_eq!(found(&missing), wanted);
     }
 
     #[test]
