@@ -18,11 +18,16 @@ pub(super) fn stated_unit(head: &[u8]) -> Option<LengthUnit> {
     })
 }
 
+/// Words of other languages that are units in a list, but rarely in a comment.
+const OTHER_WORDS: [&str; 3] = ["met", "metro", "metros"];
+
 /// Returns the unit that follows the word `unit` or `units` of a line. The word `in` is one only at the end. A unit behind a
 /// number other than 1, as in `0.1 mm`, is none.
 fn unit_of(line: &[u8]) -> Option<LengthUnit> {
     let line = text_of(line).to_lowercase();
     let (_, rest) = line.split_once("unit")?;
+    // A decimal comma.
+    let rest = rest.replace(",0 ", ".0 ");
     let words = rest.split(|c: char| !c.is_alphanumeric() && !".㎜㎝㎛".contains(c));
     let words = words.map(|word| word.trim_matches('.'));
     let mut words =
@@ -44,7 +49,8 @@ fn named_unit(word: &str) -> Option<LengthUnit> {
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
     let (number, name) = word.split_at(word.len() - word.trim_start_matches(is_of_number).len());
     let is_one = number.is_empty() || number_of(number) == Some(1.0);
-    is_one.then(|| LengthUnit::named(name).ok()).flatten()
+    let is_unit = is_one && !OTHER_WORDS.contains(&name);
+    is_unit.then(|| LengthUnit::named(name).ok()).flatten()
 }
 
 fn number_of(word: &str) -> Option<f64> {
@@ -73,6 +79,8 @@ mod tests {
             ("# unit = 1 mm", Some(LengthUnit::Mm)),
             ("# unit: 10mm", None),
             ("# unit: 1mm.", Some(LengthUnit::Mm)),
+            ("# unit = 1,0 mm", Some(LengthUnit::Mm)),
+            ("# units met the specification", None),
             ("# 1 unit = 1.0 mm", Some(LengthUnit::Mm)),
             ("# 1 unit = 0.001 m", None),
             ("# Units: milimét", Some(LengthUnit::Mm)),
