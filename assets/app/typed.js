@@ -5,10 +5,17 @@ const KEPT = `typed ${location.pathname}`;
 const AGAIN = "shown again";
 const FIELDS = "form :is(input:not([type=hidden], [type=file], [type=checkbox], [type=radio], [readonly]), select, textarea)";
 
+/** Returns a text that differs between the forms of a page. Each setting has a form; only the hidden values differ. */
+function formName(form) {
+  const hidden = [...form.elements].filter(({ type, name }) => type === "hidden" && name !== "language");
+  const action = form.dataset.post ?? form.getAttribute("action");
+  return JSON.stringify([action, ...hidden.map(({ name, value }) => [name, value])]);
+}
+
 /** Returns the fields of forms that were not sent, by the name of the form and their own. */
 function fields() {
   const named = [...document.querySelectorAll(FIELDS)].filter((field) => field.name && !("sent" in field.form.dataset));
-  return named.map((field) => [`${field.form.dataset.post ?? field.form.getAttribute("action")} ${field.name}`, field]);
+  return named.map((field) => [`${formName(field.form)} ${field.name}`, field]);
 }
 
 /** Returns the value that a field had when the page was made. */
