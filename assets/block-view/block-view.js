@@ -121,6 +121,8 @@ class BlockPage {
   endWork(hasFailed) {
     this.overview.classList.remove("block-loading");
     this.tell(hasFailed ? text("no_layer") : "");
+    // The images of the layers have different numbers of pixels, so this one may need a region.
+    if (!hasFailed) this.moved();
   }
 
   /** Shows a line over the page; an empty one hides it. */
