@@ -11,6 +11,7 @@ const BLOCK_MESSAGES = {
   boxes: { en: "Boxes", vi: "Khung chữ" },
   drawing: { en: "Drawing the {layer} …", vi: "Đang vẽ {layer} …" },
   no_layer: { en: "This layer could not be drawn. Choose it again.", vi: "Không vẽ được lớp này. Hãy chọn lại." },
+  no_layer_why: { en: "This layer could not be drawn: {why}", vi: "Không vẽ được lớp này: {why}" },
   closer: { en: "Closer", vi: "Phóng to" },
   farther: { en: "Farther", vi: "Thu nhỏ" },
   whole: { en: "Whole page", vi: "Cả trang" },

@@ -123,6 +123,15 @@ class BlockPage {
     this.tell(hasFailed ? text("no_layer") : "");
     // The images of the layers have different numbers of pixels, so this one may need a region.
     if (!hasFailed) this.moved();
+    else this.tellReason(this.layer);
+  }
+
+  /** Says why a layer could not be drawn, unless another one was chosen meanwhile, or it is drawn again. */
+  async tellReason(layer) {
+    const response = await fetch(`layer/${layer}`).catch(() => null);
+    if (!response || response.ok) return;
+    const why = refusalIn(language, await response.text(), response.status);
+    if (layer === this.layer && this.work.textContent === text("no_layer")) this.tell(text("no_layer_why", { why }));
   }
 
   /** Shows a line over the page; an empty one hides it. */
