@@ -7,7 +7,8 @@
 //! in the libraries below `crates/`, which are re-exported here under the names of their topics.
 //!
 //! Benches: `benches/accuracy` compares the stages with ground truth on pairs of [`demo`], `benches/speed` times readers and
-//! stages, `benches/queue` the catalog, and `benches/pages` finds boxes on pages of blocks. `benches/peers` and `benches/peers-queue` run other tools under the same load.
+//! stages, `benches/queue` the catalog, and `benches/pages` finds boxes on pages of blocks. `benches/peers` and
+//! `benches/peers-queue` run other tools under the same load.
 
 pub mod cli;
 pub mod documentation;

@@ -38,7 +38,7 @@ impl PagePicture {
     }
 }
 
-/// The image of a page, of which the ink was not yet looked for.
+/// The image of a page, whose ink is found later.
 #[derive(Debug)]
 pub struct DecodedPage {
     pub(super) picture: Arc<Rgb>,
@@ -69,7 +69,7 @@ impl DecodedPage {
         }
     }
 
-    /// Finds the ink, and forgets the colours that only this needs. Returns `None` if it was taken before.
+    /// Finds the ink, and frees the colours that only this needs. Returns `None` if it was taken before.
     pub(super) fn take_ink(&self) -> Option<Result<PageInk, BlockViewError>> {
         let image = locked(&self.image).take()?;
         Some(PageInk::of(&image).map_err(BlockViewError::from))

@@ -42,7 +42,7 @@ impl FailedRuns {
         let seen = self.last(&open.dir);
         let last = catalog.last_worker().await?;
         let why = failure(seen, last.as_ref());
-        // A run that began after the first question has a worker, too, and may have ended since.
+        // A run may have begun after the first check: its worker has not ended, but it was not killed.
         if why.is_some() && last.is_some_and(|worker| worker.ended.is_none()) {
             if is_running(project, catalog, now()).await? {
                 return Ok(None);
@@ -54,7 +54,8 @@ impl FailedRuns {
     }
 }
 
-/// Returns why the last run failed, from what this app saw of one and from the worker of the last one, which works no more.
+/// Returns why the last run failed: `seen` is the last failure that this app saw and its time, `last` the worker that registered
+/// last, which has stopped. A failure before the start or the end of that worker does not count.
 fn failure(seen: Option<(UnixMillis, Sentence)>, last: Option<&WorkerRecord>) -> Option<Sentence> {
     let is_later = |at| {
         last.is_some_and(|worker| worker.started > at || worker.ended.is_some_and(|end| end > at))

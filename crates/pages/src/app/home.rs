@@ -190,8 +190,7 @@ fn summary(visit: &Visit, counts: &StatusCounts, running: bool) -> Markup {
     }
 }
 
-/// Says that the last run of one did not end well. `base` is the relative address of the project, whose
-/// page says why.
+/// Says that the last run of a project did not end well. `base` is the relative address of its page, which says why.
 fn failed_run_part(visit: &Visit, base: &str) -> Markup {
     html! {
         p.notice.bad .failed-run {

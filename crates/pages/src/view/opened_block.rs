@@ -29,7 +29,7 @@ pub struct OpenedBlock {
 pub enum PictureReading {
     /// Before the page is shown, so that errors are known.
     First,
-    /// While the page is shown, which says what cannot be read. If a file is missing, the error is known at once.
+    /// While the page is shown, which says what cannot be read. If a file is missing or in an object store, like [`Self::First`].
     Meanwhile,
 }
 

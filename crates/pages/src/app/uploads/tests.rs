@@ -90,7 +90,7 @@ fn an_interrupted_upload_is_resumed_once_and_its_page_can_send_nothing_more() {
     let before = uploads.find(id).expect("a reason");
     before.take(UploadState::Storing).expect_err("taken over");
     assert_eq!(before.problem(), Some(taken_over()));
-    // The page that is closed at last cancels only what it began.
+    // The first page cancels only what it began.
     before.cancel().expect("nothing to do");
     let after = uploads.find(resumed).expect("an upload");
     after.take(UploadState::Storing).expect("its files");
