@@ -169,7 +169,9 @@ class BlockPage {
 
   /** Loads the visible part with the pixels of the page if the image of the whole layer has fewer. */
   async loadRegion() {
-    const { naturalWidth } = this.overview;
+    const { complete, naturalWidth } = this.overview;
+    // Only then its number of pixels is known. It is looked at again when the image has loaded.
+    if (!complete) return;
     const [layer, sharp] = [this.layer, naturalWidth / this.block.page_size[0]];
     if (naturalWidth > 0 && (sharp > 0.99 || this.camera.zoom * devicePixelRatio < 1.05 * sharp)) {
       this.region.hidden = true;
