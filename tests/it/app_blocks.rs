@@ -8,8 +8,10 @@ use crate::app_browser::{enter, looks_right};
 use crate::block_correction::{CorrectionSession, printed_side, refused_block, true_points};
 use crate::block_view::finished_block;
 use crate::browser::Browser;
+use crate::check::sql;
 use crate::cli::mocban;
 use crate::page::Page;
+use mocban::store::Project;
 
 const BLOCKS: &str = "/p/p/blocks";
 const BLOCK: &str = "/p/p/block/b1/";
@@ -53,6 +55,36 @@ fn a_finished_block_is_listed_described_and_drawn() {
     ] {
         assert_eq!(page.get(path).status, 404, "{path}");
     }
+}
+
+#[test]
+fn the_pictures_of_a_block_open_before_their_files_are_read() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    finished_block(dir.path());
+    // The copied project still reads the files of the one that all tests share.
+    let image = dir.path().join("other.jpg");
+    std::fs::write(&image, "another image").expect("written");
+    let project = Project::open(&dir.path().join("p")).expect("a project");
+    let path = image.display();
+    sql(&project, &format!("UPDATE block SET page_path = '{path}'"));
+    let page = open_app(dir.path());
+    let view = format!("{BLOCK}view/");
+    // The page opens, and the parts of it that need the file say why they are missing.
+    assert!(html(&page, &view).contains("href=\"layer/page\""));
+    for part in ["block.json", "layer/page", "region/relief/0/0/9/9"] {
+        let refused = page.get(&format!("{view}{part}"));
+        assert_eq!(refused.status, 503, "{part}");
+        let why = text(&refused);
+        assert!(
+            why.contains("has changed since it was aligned"),
+            "{part}: {why}"
+        );
+    }
+    // Without the file there is nothing to open.
+    std::fs::remove_file(&image).expect("removed");
+    let refused = page.get(&view);
+    assert_ne!(refused.status, 200);
+    assert!(text(&refused).contains("other.jpg"), "{}", text(&refused));
 }
 
 #[test]
