@@ -66,7 +66,12 @@ fn bad_meshes() -> Vec<Case> {
             "bad_input",
             "1 of 3 vertices have no position (NaN, infinite, above 1e15, repeated 0 0 0 or a repeated number far outside)",
         ),
-        case("no_faces", mesh(stl(&[])), "bad_input", "has no faces"),
+        case(
+            "no_faces",
+            mesh([&b"none"[..], &stl(&[])[4..]].concat()),
+            "bad_input",
+            "has no faces",
+        ),
         case(
             "one_line",
             mesh(points_on_a_line()),

@@ -41,7 +41,7 @@ use crate::domain::cancel::PolledReader;
 use crate::domain::{FileKind, are_zeros};
 use crate::page_vec::PageVec;
 use far_values::VertexKind;
-use format::DetectedFormat;
+use format::{DetectedFormat, has_extension};
 use missing::PositionCheck;
 
 /// Reads a mesh or point set from the bytes of a file, like [`read_from`].
@@ -95,7 +95,7 @@ fn read_bytes(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<MeshRead,
             stl::read_binary(bytes, limits).map(|(mesh, check)| (mesh, check, 0))
         }
         DetectedFormat::StlAscii => stl::read_ascii(bytes, limits).map(whole),
-        DetectedFormat::Xyz => xyz::read(bytes, name, limits).map(whole),
+        DetectedFormat::Xyz => xyz::read(bytes, has_extension(name, "pts"), limits).map(whole),
     }
     .map_err(|fault| text::fault_at_end(fault, bytes))?;
     if mesh.vertices.is_empty() {

@@ -15,7 +15,6 @@ mod tests;
 mod time_order;
 mod title;
 
-use super::format::has_extension;
 use super::{Mesh, MeshError, MeshLimits, text};
 use crate::domain::cancel::polled;
 use crate::domain::named_separator;
@@ -35,8 +34,8 @@ const TITLE_LINES: usize = 8;
 /// may be comments, the number of points or the names of the columns. A first column with numbers of points is ignored. An
 /// empty cell is a missing coordinate. The headers of PTX scans are applied.
 ///
-/// In a file named `*.pts`, the number before the points is theirs, so fewer points are refused.
-pub(super) fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+/// In a PTS file, the number before the points is theirs, so fewer points are refused.
+pub(super) fn read(bytes: &[u8], is_pts: bool, limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
     let separated = odd_separator(bytes).map(|odd| with_semicolons(bytes, odd));
     let bytes = separated.as_deref().unwrap_or(bytes);
@@ -44,7 +43,7 @@ pub(super) fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh
         points?
     } else {
         let points = plain_or_quoted_points(bytes, limits)?;
-        if has_extension(name, "pts") {
+        if is_pts {
             check_stated(bytes, points.len() as u64)?;
         }
         points
@@ -220,8 +219,7 @@ impl SampledPoints {
 
 #[cfg(test)]
 mod count_tests {
-    use super::read;
-    use crate::mesh::MeshLimits;
+    use crate::mesh::{MeshLimits, read};
 
     #[test]
     fn fewer_points_than_a_pts_file_states_are_refused() {

@@ -18,11 +18,12 @@ use super::draft::{
 use super::encoding_hint::encoding_hint;
 use super::error::{ManifestError, at_line, of_list};
 use super::json_rows::json_rows;
+use super::missing_words::MissingWords;
 use super::row::ReadRows;
 use super::row_reader::{is_blank, row_reader};
 use super::similar_columns::SimilarColumns;
 use super::text::{CsvText, LineCounter};
-use super::whole_numbers::{MissingWords, WholeNumbers};
+use super::whole_numbers::WholeNumbers;
 use crate::columns::HeaderColumns;
 use crate::quotes::check_quotes;
 use mocban_core::domain::spelling::plain_form;
@@ -180,7 +181,7 @@ impl BlockRows {
     fn push(&mut self, line: usize, mut draft: Result<DraftRow, String>) {
         let mut reasons = Vec::new();
         if let Ok(draft) = &mut draft {
-            MISSING_WORDS.notice(draft);
+            draft.unusual.extend(MISSING_WORDS.find(&mut draft.cells));
             self.read.unnamed.add(line, draft.unnamed);
             self.read.unusual_cells.add(line, &draft.unusual);
             self.read.formula_errors.leave_out(line, &mut draft.meta);

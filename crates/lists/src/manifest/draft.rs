@@ -7,8 +7,8 @@ use super::cell_errors::{cell_error, id_error};
 use super::cell_forms::CellForm;
 use super::error::{ManifestError, Problem, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
+use super::missing_words::MissingWords;
 use super::row::{ManifestRow, REQUIRED, ReadRows};
-use super::whole_numbers::MissingWords;
 use mocban_core::domain::spelling::{plain_form, quoted};
 use mocban_core::domain::{LengthUnit, PairName, PairNameError, sanitize, value_text};
 
@@ -91,7 +91,7 @@ impl<'e> RowCollector<'e> {
         let mut reasons = Vec::new();
         let row = match draft {
             Ok(Some(mut draft)) => {
-                MISSING_WORDS.notice(&mut draft);
+                draft.unusual.extend(MISSING_WORDS.find(&mut draft.cells));
                 self.read.unnamed.add(line, draft.unnamed);
                 self.read.unusual_cells.add(line, &draft.unusual);
                 self.read.formula_errors.leave_out(line, &mut draft.meta);

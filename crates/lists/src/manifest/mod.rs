@@ -21,6 +21,7 @@ mod jsonl;
 mod later_header;
 mod list_head;
 mod list_kind;
+mod missing_words;
 mod misspelt_columns;
 mod row;
 mod row_reader;

@@ -6,6 +6,7 @@ use memchr::memmem;
 
 use super::cell_forms::CellForm;
 use super::draft::DraftRow;
+use super::missing_words::MISSING;
 use super::row_reader::row_reader;
 use super::text::trimmed;
 use crate::json_numbers::{InexactNumber, MAX_EXACT};
@@ -13,12 +14,6 @@ use mocban_core::domain::spelling::quoted;
 
 /// Columns whose numbers are names.
 const NAMES: [&str; 3] = ["id", "block", "character"];
-
-/// Words that programs for tables write for a missing value.
-const MISSING: [&str; 8] = ["nan", "NaN", "NA", "N/A", "n/a", "<NA>", "None", "null"];
-
-/// The words of [`MISSING`] that are unlikely names of pairs and characters. Others, such as `NA`, may be initials.
-const NO_NAMES: [&str; 6] = ["NaN", "N/A", "n/a", "<NA>", "None", "null"];
 
 /// Decimals of whole numbers.
 const DECIMALS: [&str; 2] = [".0", ",0"];
@@ -154,47 +149,6 @@ pub fn whole_and_decimals(text: &str) -> Option<(&str, &'static str)> {
         is_whole(whole).then_some((whole, *decimals))
     });
     found.next()
-}
-
-/// Names and settings of a row that are words for missing values.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct MissingWords {
-    /// Columns of names that every row needs, and of characters.
-    pub(super) names: &'static [&'static str],
-    /// Columns of names that rows may lack.
-    pub(super) groups: &'static [&'static str],
-    /// Columns of a few known values.
-    pub(super) settings: &'static [&'static str],
-}
-
-impl MissingWords {
-    /// Notices such words in a row. Removes them from the columns of settings, where they can mean nothing else.
-    pub(super) fn notice(self, draft: &mut DraftRow) {
-        let is_missing = |cell: &String, words: &[&str]| words.contains(&cell.as_str());
-        for column in self.settings {
-            if draft
-                .cells
-                .get(column)
-                .is_some_and(|cell| is_missing(cell, &MISSING))
-            {
-                draft.cells.remove(column);
-                let form = CellForm::MissingSetting;
-                draft.unusual.push((form, (*column).to_owned()));
-            }
-        }
-        for (columns, words) in [(self.names, &NO_NAMES[..]), (self.groups, &MISSING[..])] {
-            for column in columns {
-                if draft
-                    .cells
-                    .get(column)
-                    .is_some_and(|cell| is_missing(cell, words))
-                {
-                    let form = CellForm::MissingName;
-                    draft.unusual.push((form, (*column).to_owned()));
-                }
-            }
-        }
-    }
 }
 
 /// Returns whether a text is a whole number as Python writes it.
