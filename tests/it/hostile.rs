@@ -207,7 +207,9 @@ fn huge_header() -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
     bytes.extend(60_000_u32.to_be_bytes());
     bytes.extend(60_000_u32.to_be_bytes());
-    bytes.extend([8, 0, 0, 0, 0, 0, 0, 0, 0]);
+    bytes.extend([8, 0, 0, 0, 0]);
+    let checksum = 0xa5b9_2a9e_u32;
+    bytes.extend(checksum.to_be_bytes());
     bytes
 }
 

@@ -15,11 +15,10 @@
 //! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
 //! and `OVERDUE` of `lease_recovery.rs`, and `DUE` of `queue/claim.rs`.
 //! ```text
-//!   ready ---- claim: queue/claim.rs ----> leased ---- ADVANCE of the last stage ----> done
-//!     ^                                      |
-//!     +---- RELEASE, SEND_BACK --------------+---- FAIL, or RECOVER, OVERDUE after too many crashes ----> quarantined
-//!     +---- RECOVER, OVERDUE ----------------+
-//!     +---- DUE ---- backoff <---- FAIL -----+
+//!   ready ---- claim: queue/claim.rs ----> leased ------ ADVANCE of the last stage ----> done
+//!     ^                                            |
+//!     +---- RELEASE, SEND_BACK, RECOVER, OVERDUE --+---- FAIL, or RECOVER, OVERDUE after too many crashes ----> quarantined
+//!     +---- DUE ---- backoff <---- FAIL -----------+
 //! ```
 //!
 //! A write under a lease is stored if the worker has not ended, its last heartbeat was at most 50 s old when the write was
@@ -41,26 +40,24 @@
 //! | a release | `checkpointer.rs`; others ignore it | `RELEASE` | the pair ends as `LeaseLost`, a block as `Released` |
 //!
 //! A job that loses its lease while it runs ends as `LeaseLost`, which counts neither as done nor as failed; after a
-//! refused heartbeat, a pair may also end as `Released`. A pair recovered from a worker that did not end may have killed
-//! it, so no other pair runs beside it (on PostgreSQL: on its host): in its own process until it has ended, in others
-//! until its next stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not started, and the process
-//! ends its old id, registers as a new worker and recovers the jobs of the old id, which count no crash. The new id ends
-//! the waits for `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`,
-//! and in `on_thread` of `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or
-//! a new cut reset it: the stage runs on, and its next write is refused. If the connection to a server breaks, writes are
-//! sent again until a stop ends the waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
+//! refused heartbeat, a pair may also end as `Released`. A pair recovered from a worker that did not end may have killed it, so
+//! no other pair runs beside it (on PostgreSQL: on its host): in its own process until it has ended, in others until its next
+//! stage is stored. After a refused heartbeat, `prefetch.rs` releases what has not started, and the process ends its old id,
+//! registers as a new worker and recovers the jobs of the old id, which count no crash. The new id ends the waits for
+//! `RunContext::expired`, which cancels the stages that run: in `Checkpointer::closed` for `pair_task.rs`, and in `on_thread` of
+//! `block/task.rs`. Heartbeats do not show that another worker recovered a job, or that a repair or a new cut reset it: the stage
+//! runs on, and its next write is refused. If the connection to a server breaks, writes are sent again until a stop ends the
+//! waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
 //!
 //! Read 18 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
-//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in its folder `queue` the files `kind.rs`,
-//! `lease.rs`, `claim.rs`, `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL
-//! `commit/write_connection.rs`, `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Leases are also taken
-//! away by the start of a run (`run.rs`), and in the catalog by `jobs/requeue.rs` (`send_back`), `jobs/retired.rs`,
-//! `audit/repair.rs` and `blocks/cut.rs`.
+//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in `queue` `kind.rs`, `lease.rs`, `claim.rs`,
+//! `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
+//! `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Others take leases away: the start of a run
+//! (`run.rs`), `send_back` in `jobs/requeue.rs`, `jobs/retired.rs`, `audit/repair.rs`, `blocks/cut.rs`.
 //!
-//! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled:
-//! inner loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs`
-//! (`block/task.rs`), which waits up to 500 ms for the end of the thread; after that its memory no longer counts. Work on
-//! other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
+//! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner
+//! loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs` (`block/task.rs`), which
+//! waits up to 500 ms for the thread; then its memory no longer counts. Other threads take the token along as a `ThreadToken`.
 
 mod artifacts_owner;
 mod block;
