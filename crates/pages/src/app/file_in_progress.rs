@@ -10,7 +10,6 @@ use super::failure::{AppFailure, AppResult};
 use super::received_files::FilePiece;
 use super::sentence::Sentence;
 use crate::local_server::WorkFailed;
-use mocban_core::domain::cancel::CancelGuard;
 use mocban_core::locked;
 
 /// When the last piece of a file arrived. `None` if no file is arriving, as while an archive is unpacked.
@@ -28,7 +27,8 @@ impl LastPiece {
     }
 }
 
-/// A file that is being received.
+/// A file that is being received. If it is dropped after its end was passed on, such as when the page is closed while an archive
+/// is unpacked, the thread finishes it; before its end, it counts as cut off.
 #[derive(Debug)]
 pub(super) struct FileInProgress {
     pub(super) pieces: mpsc::Sender<FilePiece>,
@@ -36,8 +36,6 @@ pub(super) struct FileInProgress {
     pub(super) last_piece: LastPiece,
     /// Completes when the upload of this file must stop, such as when another page takes over the upload.
     pub(super) interrupted: oneshot::Receiver<()>,
-    /// Ends the work if nobody waits for it any more.
-    pub(super) cancels: CancelGuard,
 }
 
 impl FileInProgress {
@@ -55,14 +53,10 @@ impl FileInProgress {
     /// Returns why the file is refused. Nothing of the upload is kept then.
     pub(super) async fn finish(self) -> AppResult<()> {
         let Self {
-            pieces,
-            written,
-            cancels,
-            ..
+            pieces, written, ..
         } = self;
         drop(pieces);
         let written = written.await;
-        drop(cancels);
         let written = written.map_err(|_panicked| WorkFailed)?;
         written.map_err(AppFailure::refused)
     }

@@ -16,7 +16,7 @@ use super::received_files::{ReceivedCount, ReceivedFiles};
 use super::sentence::Sentence;
 use super::upload_sentence::{busy, cut, cut_with_rest, ended, incomplete, storing, taken_over};
 use crate::local_server::WorkFailed;
-use mocban_core::domain::cancel::{CancelGuard, CancelToken};
+use mocban_core::domain::cancel::CancelToken;
 use mocban_core::locked;
 use mocban_system::failpoint::time_scale;
 
@@ -72,7 +72,7 @@ pub(super) struct FileUpload {
     /// Whether another page takes over.
     is_taken: AtomicBool,
     /// Notifies when a thread has put back the files.
-    settled: Notify,
+    pub(super) settled: Notify,
     state: Mutex<UploadState>,
 }
 
@@ -147,7 +147,7 @@ impl FileUpload {
         let _ = tokio::time::timeout(MAX_SETTLING, settled).await;
     }
 
-    /// Starts to write a file on a thread of its own.
+    /// Starts to write a file on a thread of its own, which goes on if the page is closed after all of the file has arrived.
     ///
     /// # Errors
     /// Refuses a file whose path is not safe, or while another file of the upload is arriving. After a refused path, nothing
@@ -163,7 +163,6 @@ impl FileUpload {
         self.is_taken.store(false, Ordering::Relaxed);
         self.last_piece.set(Some(Instant::now()));
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
-        let cancels = CancelGuard(token.clone());
         let (upload, path) = (Arc::clone(self), path.to_owned());
         let written = spawn_blocking(move || {
             let mut ending = UploadEnding::of(upload);
@@ -203,7 +202,6 @@ impl FileUpload {
             written,
             last_piece: self.last_piece.clone(),
             interrupted,
-            cancels,
         })
     }
 

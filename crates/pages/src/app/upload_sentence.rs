@@ -135,12 +135,6 @@ pub(super) fn cut() -> Sentence {
 
 /// Says that the browser stopped sending, and how many files need not be sent again.
 pub(super) fn cut_with_rest(arrived: u64) -> Sentence {
-    if arrived == 0 {
-        return Sentence::new(
-            "the connection was cut before all files had arrived: choose them again",
-            "kết nối bị ngắt trước khi mọi tệp đến nơi: hãy chọn lại các tệp",
-        );
-    }
     let [have, are] = [["has", "have"], ["is", "are"]].map(|forms| english_form(arrived, forms));
     let arrived = grouped(arrived);
     Sentence::new(

@@ -1,17 +1,22 @@
 //! Uploads that begin at once, that are stored, and that end after a panic.
 
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier};
 use std::time::Instant;
+
+use axum::body::Bytes;
 
 use super::{ArrivedFile, MAX_OPEN, Uploads};
 use crate::app::failure::AppResult;
 use crate::app::file_upload::{
     AnnouncedFiles, FileUpload, MAX_KEPT, MAX_SILENT, UploadActivity, UploadEnding, UploadState,
 };
-use crate::app::upload_sentence::{cut, taken_over};
+use crate::app::received_files::FilePiece;
+use crate::app::upload_sentence::{cut, cut_with_rest, taken_over};
 use crate::review::Language;
 use mocban_core::domain::cancel::CancelToken;
+use mocban_lists::workbook::test_helpers::archive;
 
 /// Announces a file with this content.
 fn files(content: &str) -> AnnouncedFiles {
@@ -41,6 +46,105 @@ fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
     drop(UploadEnding::of(Arc::clone(&upload)));
     assert!(upload.is_over(), "its place is free");
     upload.cancel().expect("nothing to do");
+}
+
+/// Sends a whole scan, and then these pieces of an archive, whose page is then closed. `free_bytes` is called before the archive
+/// is unpacked. Returns the upload once its thread has put back the files.
+async fn closed_during(
+    pieces: Vec<FilePiece>,
+    free_bytes: fn(&Path) -> Option<u64>,
+    on_close: impl FnOnce(),
+) -> (tempfile::TempDir, Arc<FileUpload>) {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let two = AnnouncedFiles {
+        files: 2,
+        ..files("x")
+    };
+    let (id, _) = uploads.begin(&two).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    let first = upload.start("1.stl", Some(1)).expect("ready");
+    first.pass(FilePiece::End).await;
+    first.finish().await.expect("an empty scan");
+    if let UploadState::Ready(received, _) = &mut *upload.lock() {
+        received.free_bytes = free_bytes;
+    }
+    let file = upload.start("2.zip", Some(1)).expect("ready");
+    for piece in pieces {
+        file.pass(piece).await;
+    }
+    {
+        let settled = upload.settled.notified();
+        tokio::pin!(settled);
+        settled.as_mut().enable();
+        drop(file);
+        on_close();
+        settled.await;
+    }
+    (dir, upload)
+}
+
+#[tokio::test]
+async fn a_page_that_is_closed_while_an_archive_is_unpacked_loses_nothing() {
+    static CLOSED: Barrier = Barrier::new(2);
+    let whole = Bytes::from(archive(&[("3.stl", "solid")], true));
+    let wait: fn(&Path) -> Option<u64> = |_| {
+        CLOSED.wait();
+        None
+    };
+    let pieces = vec![FilePiece::Bytes(whole.clone()), FilePiece::End];
+    let on_close = || {
+        CLOSED.wait();
+    };
+    let (_dir, upload) = closed_during(pieces, wait, on_close).await;
+    assert_eq!(upload.problem(), None);
+    let placed = upload.finish().await.expect("both have arrived");
+    for scan in ["1.stl", "3.stl"] {
+        assert!(placed.join(scan).is_file(), "{scan}");
+    }
+}
+
+#[tokio::test]
+async fn a_page_that_is_closed_before_the_end_of_a_file_can_resume() {
+    let pieces = vec![FilePiece::Bytes(Bytes::from_static(b"PK"))];
+    let (_dir, upload) = closed_during(pieces, |_| None, || {}).await;
+    assert_eq!(upload.problem(), Some(cut_with_rest(1)));
+    let kept = upload.give_up().expect("the scan");
+    assert_eq!(kept.arrived().len(), 1);
+}
+
+#[tokio::test]
+async fn an_upload_whose_page_is_closed_can_be_cancelled_while_an_archive_is_unpacked() {
+    static CANCELLED: Barrier = Barrier::new(2);
+    let whole = Bytes::from(archive(&[("3.stl", "solid")], true));
+    let wait: fn(&Path) -> Option<u64> = |_| {
+        CANCELLED.wait();
+        CANCELLED.wait();
+        None
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let (id, _) = uploads.begin(&files("x")).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    if let UploadState::Ready(received, _) = &mut *upload.lock() {
+        received.free_bytes = wait;
+    }
+    let file = upload.start("2.zip", Some(1)).expect("ready");
+    file.pass(FilePiece::Bytes(whole)).await;
+    file.pass(FilePiece::End).await;
+    {
+        let settled = upload.settled.notified();
+        tokio::pin!(settled);
+        settled.as_mut().enable();
+        drop(file);
+        CANCELLED.wait();
+        upload.cancel().expect("it is not stored");
+        CANCELLED.wait();
+        settled.await;
+    }
+    assert!(upload.is_over());
+    let left = std::fs::read_dir(uploads.folder()).expect("a folder");
+    assert_eq!(left.count(), 0, "nothing is kept");
 }
 
 /// Begins two uploads of the same files at once.
