@@ -33,10 +33,11 @@ export function read(status, text) {
   return reply;
 }
 
-/** Sends an action. Its reply says which page follows. */
-export async function act(address, fields) {
+/** Sends an action. Its reply says which page follows. With `keepalive`, it is sent even while the page is closed. */
+export async function act(address, fields, keepalive = false) {
   const response = await fetch(address, {
     method: "POST",
+    keepalive,
     headers: { "content-type": "application/json", "x-csrf-token": token },
     body: JSON.stringify(fields),
   }).catch(() => {

@@ -233,9 +233,13 @@ cancel.addEventListener("click", async () => {
   upload.request?.abort();
 });
 
-// If the page is closed nevertheless, the connection is cut, and the files that have arrived are kept for the next page.
 window.addEventListener("beforeunload", (event) => {
   if (current) event.preventDefault();
+});
+// The files that have arrived are kept for the next page.
+window.addEventListener("pagehide", () => {
+  if (!current || current.isCancelled) return;
+  act("actions/upload-end", { upload: current.id, end: "pause", project: "" }, true).catch(() => null);
 });
 
 form.dataset.ready = "true";

@@ -71,6 +71,8 @@ pub(super) struct FileUpload {
     pub(super) last_piece: LastPiece,
     /// Whether another page takes over.
     is_taken: AtomicBool,
+    /// Whether the page was closed, so that the upload is interrupted after the file that a thread has.
+    is_left: AtomicBool,
     /// Notifies when a thread has put back the files.
     pub(super) settled: Notify,
     state: Mutex<UploadState>,
@@ -100,6 +102,7 @@ impl FileUpload {
             count: Arc::clone(&received.count),
             last_piece: LastPiece::default(),
             is_taken: AtomicBool::new(false),
+            is_left: AtomicBool::new(false),
             settled: Notify::new(),
             state: Mutex::new(UploadState::Ready(received, Instant::now())),
         }
@@ -160,7 +163,9 @@ impl FileUpload {
         let token = CancelToken::default();
         let (interrupt, interrupted) = oneshot::channel();
         let received = self.take(UploadState::Busy(token.clone(), Some(interrupt)))?;
-        self.is_taken.store(false, Ordering::Relaxed);
+        for ended in [&self.is_taken, &self.is_left] {
+            ended.store(false, Ordering::Relaxed);
+        }
         self.last_piece.set(Some(Instant::now()));
         let (pieces, arriving) = mpsc::channel(WAITING_PIECES);
         let (upload, path) = (Arc::clone(self), path.to_owned());
@@ -279,6 +284,28 @@ impl FileUpload {
         }
     }
 
+    /// Interrupts the upload because its page was closed, so that another page can resume it. A file that a thread has first
+    /// comes to its end. Without files that could be resumed, the upload stays as it is.
+    pub(super) fn pause(&self) {
+        let mut state = self.lock();
+        self.is_left.store(true, Ordering::Relaxed);
+        let before = std::mem::replace(&mut *state, UploadState::Storing);
+        *state = self.paused_if_left(before);
+    }
+
+    /// Returns the state in which an upload waits for another page if its page was closed while it waited for the next file.
+    fn paused_if_left(&self, state: UploadState) -> UploadState {
+        match state {
+            UploadState::Ready(received, _)
+                if self.is_left.load(Ordering::Relaxed) && !received.arrived().is_empty() =>
+            {
+                let why = cut_with_rest(received.arrived().len() as u64);
+                UploadState::Paused(received, Instant::now(), why)
+            }
+            other => other,
+        }
+    }
+
     /// Keeps the files of an upload that cannot be continued now.
     pub(super) fn interrupt(&self, why: Sentence) {
         let mut state = self.lock();
@@ -309,6 +336,7 @@ impl FileUpload {
     /// Stores the next state of the upload, unless the upload was cancelled meanwhile.
     fn settle(&self, next: UploadState) {
         let mut state = self.lock();
+        let next = self.paused_if_left(next);
         let unused = match &*state {
             UploadState::Busy(..) | UploadState::Storing => std::mem::replace(&mut *state, next),
             UploadState::Ready(..) | UploadState::Paused(..) | UploadState::Ended(_) => next,
@@ -339,6 +367,11 @@ impl FileUpload {
             UploadState::Ready(_, since) if since.elapsed() > MAX_IDLE => Some(since),
             _ => None,
         }
+    }
+
+    /// Returns about how many bytes the files that have arrived take on the disk.
+    pub(super) fn kept_bytes(&self) -> u64 {
+        self.count.bytes.load(Ordering::Relaxed)
     }
 
     /// Ends an upload that nobody has resumed for [`MAX_KEPT`], and removes its files. Returns whether it has ended.

@@ -136,6 +136,8 @@ pub(super) async fn progress(
 enum UploadEnd {
     Finish,
     Cancel,
+    /// The page was closed.
+    Pause,
 }
 
 /// The end of an upload.
@@ -148,7 +150,7 @@ pub(super) struct UploadEndBody {
     project: String,
 }
 
-/// Gives the files of an upload their folder, or removes them.
+/// Gives the files of an upload their folder, removes them, or keeps them for another page.
 pub(super) async fn end(
     State(state): State<Arc<AppState>>,
     ActionBody(body): ActionBody<UploadEndBody>,
@@ -158,6 +160,10 @@ pub(super) async fn end(
         UploadEnd::Cancel => {
             let cancelled = spawn_blocking(move || upload.cancel()).await;
             cancelled.map_err(|_panicked| WorkFailed)??;
+            Ok(Json(json!({})))
+        }
+        UploadEnd::Pause => {
+            upload.pause();
             Ok(Json(json!({})))
         }
         UploadEnd::Finish => {

@@ -34,6 +34,8 @@ pub(super) struct Uploads {
     next: AtomicU64,
     /// Whether an earlier process left an upload.
     has_left_over: bool,
+    /// Returns how many bytes the disk of a folder has room for.
+    free_bytes: fn(&Path) -> Option<u64>,
 }
 
 impl Uploads {
@@ -47,6 +49,7 @@ impl Uploads {
             open: Mutex::default(),
             next: AtomicU64::new(1),
             has_left_over,
+            free_bytes: platform::free_bytes,
         }
     }
 
@@ -61,8 +64,8 @@ impl Uploads {
         made.is_none_or(platform::may_write)
     }
 
-    /// Begins an upload, or resumes an interrupted one of the same files. Removes uploads that ended or were abandoned. Returns
-    /// the number of the upload, and the files that need not be sent again. Waits for the disk.
+    /// Begins an upload, or resumes an interrupted one of the same files. Removes uploads that ended or were abandoned, and
+    /// interrupted ones if the disk has no room without that. Returns the number of the upload, and the files that need not be sent again. Waits for the disk.
     ///
     /// # Errors
     /// Refuses too many files, more bytes than the disk has room for, and files that another page is sending.
@@ -78,9 +81,7 @@ impl Uploads {
         let arrived = resumed.iter().flat_map(|(_, arrived)| arrived);
         let bytes = files.bytes;
         let bytes = bytes.saturating_sub(arrived.map(|file| file.size).sum());
-        if let Some(parent) = self.folder.parent()
-            && let Err(why) = check_room(platform::free_bytes(parent), bytes)
-        {
+        if let Err(why) = self.make_room(bytes) {
             if let Some((id, _)) = resumed {
                 self.find(id)?.interrupt(why.clone());
             }
@@ -106,6 +107,36 @@ impl Uploads {
         let id = self.next.fetch_add(1, Ordering::Relaxed);
         open.insert(id, Arc::clone(&upload));
         Ok((id, Vec::new()))
+    }
+
+    /// Checks that the disk has room for these bytes. If it has not, removes interrupted uploads, the oldest first, unless all
+    /// of them would not be enough.
+    ///
+    /// # Errors
+    /// Returns the reason if less than the reserve would stay free.
+    fn make_room(&self, bytes: u64) -> Result<(), Sentence> {
+        let Some(parent) = self.folder.parent() else {
+            return Ok(());
+        };
+        loop {
+            let free = (self.free_bytes)(parent);
+            let checked = check_room(free, bytes);
+            let Err(why) = checked else {
+                return Ok(());
+            };
+            let oldest = {
+                let mut open = locked(&self.open);
+                let paused = paused(&open);
+                let kept = paused.iter().map(|(_, id)| open[id].kept_bytes()).sum();
+                if check_room(free.map(|free| free.saturating_add(kept)), bytes).is_err() {
+                    return Err(why);
+                }
+                let oldest = paused.into_iter().min();
+                oldest.and_then(|(_, id)| open.remove(&id))
+            };
+            // Its files are removed without the lock.
+            drop(oldest.ok_or(why)?);
+        }
     }
 
     /// Resumes an interrupted upload of the same files under a new number, so that the page that sent them before cannot go on
@@ -148,9 +179,7 @@ impl Uploads {
                 removed.extend(open.extract_if(.., |_, upload| upload.is_over()));
             }
             if open.len() >= MAX_OPEN {
-                let paused = open.iter();
-                let paused = paused.filter_map(|(id, upload)| Some((upload.paused_since()?, *id)));
-                let oldest = paused.min();
+                let oldest = paused(&open).into_iter().min();
                 removed.extend(oldest.and_then(|(_, id)| open.remove_entry(&id)));
             }
             removed
@@ -182,6 +211,13 @@ impl Uploads {
         let is_first = self.next.load(Ordering::Relaxed) == 1;
         (self.has_left_over && is_first).then(left_over)
     }
+}
+
+/// Returns since when uploads are interrupted, with their numbers.
+fn paused(open: &OpenUploads) -> Vec<(Instant, u64)> {
+    let uploads = open.iter();
+    let paused = uploads.filter_map(|(id, upload)| Some((upload.paused_since()?, *id)));
+    paused.collect()
 }
 
 /// Refuses files that another page is sending.

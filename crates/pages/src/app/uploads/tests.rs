@@ -7,16 +7,17 @@ use std::time::Instant;
 
 use axum::body::Bytes;
 
-use super::{ArrivedFile, MAX_OPEN, Uploads};
+use super::{ArrivedFile, FOLDER, MAX_OPEN, Uploads};
 use crate::app::failure::AppResult;
 use crate::app::file_upload::{
     AnnouncedFiles, FileUpload, MAX_KEPT, MAX_SILENT, UploadActivity, UploadEnding, UploadState,
 };
 use crate::app::received_files::FilePiece;
-use crate::app::upload_sentence::{cut, cut_with_rest, taken_over};
+use crate::app::upload_sentence::{RESERVE_BYTES, cut, cut_with_rest, taken_over};
 use crate::review::Language;
 use mocban_core::domain::cancel::CancelToken;
 use mocban_lists::workbook::test_helpers::archive;
+use mocban_store::NewFolder;
 
 /// Announces a file with this content.
 fn files(content: &str) -> AnnouncedFiles {
@@ -111,6 +112,31 @@ async fn a_page_that_is_closed_before_the_end_of_a_file_can_resume() {
     assert_eq!(upload.problem(), Some(cut_with_rest(1)));
     let kept = upload.give_up().expect("the scan");
     assert_eq!(kept.arrived().len(), 1);
+}
+
+#[tokio::test]
+async fn an_upload_whose_page_is_closed_between_two_files_is_resumed_at_once() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let uploads = Uploads::new(dir.path());
+    let (id, _) = uploads.begin(&files("x")).expect("begun");
+    let upload = uploads.find(id).expect("an upload");
+    upload.pause();
+    assert_eq!(upload.problem(), None, "nothing would be lost");
+    let file = upload.start("1.stl", Some(1)).expect("it came back");
+    file.pass(FilePiece::End).await;
+    file.finish().await.expect("an empty scan");
+    assert_eq!(upload.problem(), None);
+    upload.pause();
+    assert_eq!(uploads.problem(""), Some(cut_with_rest(1)));
+    let (resumed, arrived) = uploads.begin(&files("x")).expect("resumed");
+    assert_ne!(resumed, id);
+    assert_eq!(arrived.len(), 1);
+    let upload = uploads.find(resumed).expect("an upload");
+    let file = upload.start("2.stl", Some(1)).expect("ready");
+    upload.pause();
+    file.pass(FilePiece::End).await;
+    file.finish().await.expect("it has arrived");
+    assert_eq!(upload.problem(), Some(cut_with_rest(2)));
 }
 
 #[tokio::test]
@@ -227,6 +253,36 @@ fn a_new_upload_takes_the_place_of_the_oldest_interrupted_one_alone() {
         ids.map(|id| uploads.find(id).is_ok()),
         [true, true, true, false]
     );
+}
+
+#[test]
+fn interrupted_uploads_give_their_room_to_a_new_one_from_the_oldest_on() {
+    // A disk on which an upload takes one byte, with room for three.
+    let three: fn(&Path) -> Option<u64> = |dir| {
+        let files = std::fs::read_dir(dir.join(FOLDER)).expect("a folder");
+        let is_upload = |name: &str| NewFolder::is_unfinished(name.as_ref());
+        let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
+        Some(RESERVE_BYTES + 3 - names.filter(|name| is_upload(name)).count() as u64)
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let mut uploads = Uploads::new(dir.path());
+    let now = Instant::now();
+    let ids = [2, 3, 1].map(|age| {
+        let id = interrupted(&uploads, &format!("{age}"), now + MAX_SILENT * age);
+        let upload = uploads.find(id).expect("an upload");
+        upload.count.bytes.store(1, Ordering::Relaxed);
+        id
+    });
+    uploads.free_bytes = three;
+    let are_kept = |uploads: &Uploads| ids.map(|id| uploads.find(id).is_ok());
+    let large = AnnouncedFiles {
+        bytes: 4,
+        ..files("large")
+    };
+    uploads.begin(&large).expect_err("it has never room");
+    assert_eq!(are_kept(&uploads), [true; 3], "nothing is removed in vain");
+    uploads.begin(&files("new")).expect("room");
+    assert_eq!(are_kept(&uploads), [true, true, false]);
 }
 
 /// Returns an upload of which a file has arrived and another one arrives, on no thread.
