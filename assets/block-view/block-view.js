@@ -167,6 +167,13 @@ class BlockPage {
     this.waiting = setTimeout(() => this.loadRegion(), REGION_WAIT);
   }
 
+  /** Says that nothing more is needed now, so that the program reads the files of the other layers. A region says it, too. */
+  prepareLayers() {
+    if (this.hasPrepared) return;
+    this.hasPrepared = true;
+    fetch("layers").catch(() => null);
+  }
+
   /** Loads the visible part with the pixels of the page if the image of the whole layer has fewer. */
   async loadRegion() {
     const { complete, naturalWidth } = this.overview;
@@ -175,6 +182,7 @@ class BlockPage {
     const [layer, sharp] = [this.layer, naturalWidth / this.block.page_size[0]];
     if (naturalWidth > 0 && (sharp > 0.99 || this.camera.zoom * devicePixelRatio < 1.05 * sharp)) {
       this.region.hidden = true;
+      if (naturalWidth > 0) this.prepareLayers();
       return;
     }
     const part = this.camera.visible();

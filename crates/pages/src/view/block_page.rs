@@ -82,6 +82,7 @@ fn page_routes(
         .route("/", get(index))
         .route("/block.json", get(block_json))
         .route("/layer/{layer}", get(overview))
+        .route("/layers", get(layers))
         .route("/region/{layer}/{x}/{y}/{width}/{height}", get(region))
         .route("/scan/{index}", get(scan))
         .with_state(BlockPageState {
@@ -93,7 +94,7 @@ fn page_routes(
 
 async fn index(State(state): State<BlockPageState>, RawQuery(query): RawQuery) -> Html<String> {
     let language = Language::asked_for(query.as_deref()).or(state.language);
-    let name = state.shown.block.name.as_str();
+    let name = state.shown.pictures.block.name.as_str();
     Html(page::block(name, language, state.back))
 }
 
@@ -102,10 +103,10 @@ async fn asset(Path(name): Path<String>) -> Response {
 }
 
 async fn block_json(State(state): State<BlockPageState>) -> Response {
-    match state.shown.page().await {
+    match state.shown.pictures.page().await {
         Ok(page) => {
             let kind = [(header::CONTENT_TYPE, "application/json")];
-            let shown = state.shown.block.to_json(page.size());
+            let shown = state.shown.pictures.block.to_json(page.size());
             (kind, shown.to_string()).into_response()
         }
         Err(why) => unavailable(&why),
@@ -114,9 +115,15 @@ async fn block_json(State(state): State<BlockPageState>) -> Response {
 
 async fn overview(State(state): State<BlockPageState>, Path(layer): Path<String>) -> Response {
     match layer.parse::<PageLayer>() {
-        Ok(layer) => picture(state.shown.overview(layer).await),
+        Ok(layer) => picture(state.shown.pictures.overview(layer).await),
         Err(_) => StatusCode::NOT_FOUND.into_response(),
     }
+}
+
+/// Begins to read the files of the layers, because the page shows enough.
+async fn layers(State(state): State<BlockPageState>) -> StatusCode {
+    state.shown.read_layers();
+    StatusCode::NO_CONTENT
 }
 
 async fn region(
@@ -143,8 +150,12 @@ fn picture(drawn: Result<Option<Bytes>, String>) -> Response {
 }
 
 async fn scan(State(state): State<BlockPageState>, Path(index): Path<usize>) -> Response {
-    let shown = Arc::clone(&state.shown);
-    let read = state.shown.work.call(move || shown.block.scan(index));
+    let shown = Arc::clone(&state.shown.pictures);
+    let read = state
+        .shown
+        .pictures
+        .work
+        .call(move || shown.block.scan(index));
     let failed = |why: String| refused(StatusCode::INTERNAL_SERVER_ERROR, &why);
     match read.await {
         Ok(Ok(Some(bytes))) => {

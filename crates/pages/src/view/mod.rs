@@ -3,6 +3,7 @@
 mod block_access;
 mod block_labels;
 mod block_page;
+mod block_pictures;
 mod block_points;
 mod boxes_page;
 mod correction_page;

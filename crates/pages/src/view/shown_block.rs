@@ -1,145 +1,103 @@
-//! What the page of an aligned block shows: its image of the page first, then the layers that need more time.
+//! An aligned block whose page is open: what is read for it before it is asked for.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use axum::body::Bytes;
+use tokio::task::JoinSet;
 
-use super::read_once::ReadOnce;
+use super::block_pictures::BlockPictures;
 use crate::local_server::WorkThread;
-use mocban_export::block_view::{
-    AlignedBlock, BlockView, BlockViewError, DecodedPage, PageLayer, PageLayers, PageRegion,
-};
-use mocban_project::ProjectError;
+use mocban_core::locked;
+use mocban_export::block_view::{AlignedBlock, BlockView, PageLayer, PageRegion};
 
-/// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
-/// part and so never have fewer pixels.
-const LONGEST_SIDE: usize = 3000;
-/// Longer side of the image of the whole page, which is seen first, pixels. It is sharp in a window of this size, and is encoded
-/// in a fifth of the time; larger windows and closer views then ask for regions.
-const FIRST_SIDE: usize = 1280;
+/// Work before it is asked for. It is cancelled when this is dropped.
+#[derive(Debug, Default)]
+struct EarlyWork(Mutex<JoinSet<()>>);
 
-/// An aligned block, with the pictures of it that were asked for.
+impl EarlyWork {
+    /// Begins work. What it returns is asked for later, also why it failed.
+    fn begin<T>(&self, work: impl Future<Output = T> + Send + 'static) {
+        let work = async move {
+            work.await;
+        };
+        locked(&self.0).spawn(work);
+    }
+}
+
+/// An aligned block with its pictures, as long as its page is open.
 #[derive(Debug)]
 pub(super) struct ShownBlock {
-    pub(super) block: AlignedBlock,
-    /// Reads files and draws, one picture after another.
-    pub(super) work: Arc<WorkThread>,
-    /// Folder of the project, which errors name.
-    dir: PathBuf,
-    page: ReadOnce<DecodedPage>,
-    layers: ReadOnce<PageLayers>,
-    overviews: [ReadOnce<Bytes>; PageLayer::ALL.len()],
+    pub(super) pictures: Arc<BlockPictures>,
+    early: EarlyWork,
+    /// Whether the layers were read or are being read.
+    has_layers: AtomicBool,
 }
 
 impl ShownBlock {
-    /// Starts without pictures. Draws the page, and then reads the files of the other layers, unless nobody keeps the block any
-    /// more. The first picture is there earlier than if its request began it.
+    /// Begins to draw the page, so that its picture is there earlier than if its request began it.
     pub(super) fn begin(block: AlignedBlock, dir: PathBuf, work: Arc<WorkThread>) -> Arc<Self> {
-        let begun = Arc::new(Self {
-            block,
-            work,
-            dir,
-            page: ReadOnce::default(),
-            layers: ReadOnce::default(),
-            overviews: PageLayer::ALL.map(|_| ReadOnce::default()),
-        });
-        let block = Arc::downgrade(&begun);
-        tokio::spawn(async move {
-            // A request that fails for the same reason says so.
-            if let Some(block) = block.upgrade() {
-                let _ = block.overview(PageLayer::Page).await;
-            }
-            if let Some(block) = block.upgrade() {
-                let _ = block.layers().await;
-            }
-        });
-        begun
+        let shown = Self::with(BlockPictures::new(block, dir, work), false);
+        let first = Arc::clone(&shown.pictures);
+        shown
+            .early
+            .begin(async move { first.overview(PageLayer::Page).await });
+        shown
     }
 
     /// Starts with the files of all layers.
     pub(super) fn of(view: BlockView, dir: PathBuf, work: Arc<WorkThread>) -> Arc<Self> {
-        let BlockView { block, layers } = view;
+        Self::with(BlockPictures::of(view, dir, work), true)
+    }
+
+    fn with(pictures: Arc<BlockPictures>, has_layers: bool) -> Arc<Self> {
         Arc::new(Self {
-            block,
-            work,
-            dir,
-            page: ReadOnce::of(DecodedPage::of_layers(&layers)),
-            layers: ReadOnce::of(layers),
-            overviews: PageLayer::ALL.map(|_| ReadOnce::default()),
+            pictures,
+            early: EarlyWork::default(),
+            has_layers: AtomicBool::new(has_layers),
         })
     }
 
-    /// Returns the image of the page. Returns a sentence if it cannot be read.
-    pub(super) async fn page(self: &Arc<Self>) -> Result<Arc<DecodedPage>, String> {
-        self.page
-            .get(|| self.read(|own| own.block.read_page()))
-            .await
-    }
-
-    async fn layers(self: &Arc<Self>) -> Result<Arc<PageLayers>, String> {
-        let page = self.page().await?;
-        let read = move |own: &Self| own.block.read_layers(&page);
-        self.layers.get(|| self.read(read)).await
-    }
-
-    /// Reads files on the thread for long work.
-    async fn read<T: Send + 'static>(
-        self: &Arc<Self>,
-        read: impl FnOnce(&Self) -> Result<T, BlockViewError> + Send + 'static,
-    ) -> Result<T, String> {
-        let own = Arc::clone(self);
-        let read = self.work.call(move || read(&own)).await;
-        let read = read.map_err(|error| error.to_string())?;
-        read.map_err(|error| ProjectError::from(error).text(&self.dir))
-    }
-
-    /// Returns the image of a whole layer as JPEG, which is drawn once. Returns a sentence if a file cannot be read.
-    pub(super) async fn overview(
-        self: &Arc<Self>,
-        layer: PageLayer,
-    ) -> Result<Option<Bytes>, String> {
-        let at = PageLayer::ALL.iter().position(|one| *one == layer);
-        let Some(stored) = at.and_then(|at| self.overviews.get(at)) else {
-            return Ok(None);
-        };
-        let whole = self.page().await?.whole();
-        let longest = match layer {
-            PageLayer::Page => FIRST_SIDE,
-            PageLayer::Relief | PageLayer::Overlay => LONGEST_SIDE,
-        };
-        let drawn = stored.get(|| self.draw(layer, whole, longest)).await?;
-        Ok(Some((*drawn).clone()))
-    }
-
-    /// Draws the part of a layer that lies in a region as JPEG; `None` if the region lies beside the page. Returns a sentence
-    /// if a file cannot be read.
-    pub(super) async fn region(
-        self: &Arc<Self>,
-        layer: PageLayer,
-        region: PageRegion,
-    ) -> Result<Option<Bytes>, String> {
-        match region.within(self.page().await?.size()) {
-            Some(part) => Ok(Some(self.draw(layer, part, LONGEST_SIDE).await?)),
-            None => Ok(None),
+    /// Begins to read the files of the layers, once. They take the thread of the pictures for seconds, so the page asks for this
+    /// only when it shows enough.
+    pub(super) fn read_layers(&self) {
+        if !self.has_layers.swap(true, Ordering::Relaxed) {
+            let pictures = Arc::clone(&self.pictures);
+            self.early.begin(async move { pictures.layers().await });
         }
     }
 
-    /// Draws a region of a layer as JPEG on the thread for long work. Its longer side has at most `longest` pixels.
-    async fn draw(
-        self: &Arc<Self>,
+    /// Draws a region as [`BlockPictures::region`] does, and then begins to read the layers.
+    pub(super) async fn region(
+        &self,
         layer: PageLayer,
         region: PageRegion,
-        longest: usize,
-    ) -> Result<Bytes, String> {
-        let drawn = if layer == PageLayer::Page {
-            let page = self.page().await?;
-            self.work.call(move || page.jpeg(region, longest)).await
-        } else {
-            let layers = self.layers().await?;
-            let draw = move || layers.jpeg(layer, region, longest);
-            self.work.call(draw).await
-        };
-        drawn.map(Bytes::from).map_err(|error| error.to_string())
+    ) -> Result<Option<Bytes>, String> {
+        let drawn = self.pictures.region(layer, region).await;
+        self.read_layers();
+        drawn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::sync::oneshot;
+
+    use super::EarlyWork;
+
+    #[tokio::test]
+    async fn early_work_ends_with_the_page() {
+        let early = EarlyWork::default();
+        let (begun, begins) = oneshot::channel();
+        let (held, ended) = oneshot::channel::<()>();
+        early.begin(async move {
+            let _held = held;
+            begun.send(()).expect("a receiver");
+            std::future::pending::<()>().await;
+        });
+        begins.await.expect("it begins");
+        drop(early);
+        ended.await.expect_err("nothing is sent any more");
     }
 }
