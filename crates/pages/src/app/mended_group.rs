@@ -9,8 +9,8 @@ use super::projects::OpenProject;
 use super::visit::Visit;
 use mocban_core::domain::{FailureClass, PairName, one_line};
 
-/// Most failures of the class among which pairs are searched, in the order of import.
-const SEARCHED: usize = 10_000;
+/// Failures of the class among which pairs are searched: all that a project may have.
+const SEARCHED: usize = i32::MAX as usize;
 /// Most pairs that are named.
 const SHOWN: usize = 60;
 
@@ -18,14 +18,14 @@ const SHOWN: usize = 60;
 #[derive(Debug)]
 pub(super) struct MendedGroup {
     class: FailureClass,
-    /// In the order of import, without pairs that were cut from blocks.
+    /// In the order of import, without pairs that were cut from blocks. Up to one more than are named.
     names: Vec<PairName>,
 }
 
 impl MendedGroup {
     /// Reads the pairs of a project that failed with a class.
     pub(super) async fn read(open: &OpenProject, class: FailureClass) -> AppResult<Self> {
-        let names = (open.catalog).failed_scans(class, false, [SEARCHED, SEARCHED]);
+        let names = (open.catalog).failed_scans(class, false, [SEARCHED, SHOWN + 1]);
         Ok(Self {
             class,
             names: names.await?,
@@ -34,7 +34,8 @@ impl MendedGroup {
 
     /// Names the pairs with links, and says how their files are replaced. `key` names the project.
     pub(super) fn part(&self, visit: &Visit, key: &str) -> Markup {
-        let number = self.names.len() as u64;
+        let number = self.names.len().min(SHOWN) as u64;
+        let has_more = self.names.len() > SHOWN;
         let page = |page: &str| visit.project_page(key, page);
         let all = page(&format!(
             "pairs?view=table&state=failed&class={}",
@@ -46,13 +47,13 @@ impl MendedGroup {
                     p { (visit.t("No failed pair of this kind is left:", "Không còn cặp lỗi nào thuộc loại này:")) " " (visit.class(self.class)) "." }
                 } @else {
                     p {
-                        b { (grouped(number)) " " (visit.form(number, ["failed pair", "failed pairs"], "cặp lỗi")) }
+                        b { @if has_more { (visit.t("more than", "hơn")) " " } (grouped(number)) " " (visit.form(number, ["failed pair", "failed pairs"], "cặp lỗi")) }
                         " (" (visit.class(self.class)) "): "
                         @for (index, name) in self.names.iter().take(SHOWN).enumerate() {
                             @if index > 0 { ", " }
                             a href=(page(&format!("pair/{}/", encoded(name.as_str())))) { (one_line(name.as_str())) }
                         }
-                        @if self.names.len() > SHOWN { ", …" }
+                        @if has_more { ", …" }
                     }
                     p { (visit.t(
                         "To replace their files: name each new scan or print like its pair, with .ply, .stl or .obj for a scan, and .png, .jpg or .tif for a print, and send only the scans or only the prints here. The page then offers to replace the files of the pairs.",
@@ -108,8 +109,14 @@ mod tests {
     #[test]
     fn a_large_group_names_its_first_pairs_and_an_empty_one_none() {
         let large = shown(Language::English, SHOWN + 1);
-        assert!(large.contains("<b>61 failed pairs</b>"), "{large}");
+        assert!(
+            large.contains("<b>more than 60 failed pairs</b>"),
+            "{large}"
+        );
         assert!(large.contains("chữ 60</a>, …"), "{large}");
+        let all = shown(Language::English, SHOWN);
+        assert!(all.contains("<b>60 failed pairs</b>"), "{all}");
+        assert!(all.contains("chữ 60</a></p>"), "{all}");
         let empty = shown(Language::English, 0);
         assert!(
             empty.contains("No failed pair of this kind is left"),
