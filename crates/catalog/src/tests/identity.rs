@@ -1,4 +1,4 @@
-//! The identity of a catalog, by which it owns a place of artifacts.
+//! The identity of a catalog, by which it owns a place of artifacts, and its workers, which a restored copy does not have.
 
 use super::{CatalogPlace, World};
 use crate::Catalog;
@@ -33,6 +33,25 @@ async fn a_restored_backup_has_an_identity_of_its_own() {
     let original = world.catalog.identity().await.expect("an identity");
     let other = restored.identity().await.expect("an identity");
     assert_ne!(other.id, original.id);
+}
+
+#[tokio::test]
+async fn a_backup_during_a_run_is_restored_without_its_workers() {
+    let world = World::new(1).await;
+    assert_eq!(world.claim(1).await.len(), 1);
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let [backup, restored] = ["b.sqlite", "catalog.sqlite"].map(|name| dir.path().join(name));
+    let saved = world.catalog.back_up(&backup, None).await;
+    saved.expect("a backup");
+    let settings = Catalog::restore_backup(&backup, &restored).await;
+    settings.expect("restored");
+    let restored = Catalog::open(&restored).await.expect("a catalog");
+    let last = restored.last_worker().await.expect("read");
+    let last = last.expect("the worker of the run");
+    assert_eq!(last.ended, Some(last.heartbeat), "it was not killed");
+    assert_eq!(last.leased, 1, "the next run takes the pair back");
+    let original = world.catalog.last_worker().await.expect("read");
+    assert_eq!(original.expect("a worker").ended, None);
 }
 
 #[tokio::test]

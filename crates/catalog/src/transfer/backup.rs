@@ -83,7 +83,7 @@ impl Catalog {
         let copied = vacuum_into(&mut conn, file).await?;
         copied.map_err(|error| in_file(backup, not_copied(file, error)))?;
         conn.close().await.map_err(unreadable)?;
-        let renewed = renew_identity(file).await;
+        let renewed = make_independent(file).await;
         renewed.map_err(|error| disk_error(file, error))?;
         let taken = take_settings(file).await;
         let settings = taken.map_err(|error| disk_error(file, error))?;
@@ -129,12 +129,16 @@ async fn store_settings(file: &Path, settings: Option<&[u8]>) -> sqlx::Result<()
     copy.close().await
 }
 
-/// Gives a restored catalog an identity of its own, so that it does not own the artifacts of the original.
-async fn renew_identity(file: &Path) -> sqlx::Result<()> {
+/// Gives a restored catalog an identity of its own, so that it does not own the artifacts of the original, and ends the workers
+/// of the original, which a backup during a run has: they do not work on the copy, and were not killed.
+async fn make_independent(file: &Path) -> sqlx::Result<()> {
     let mut copy = open_copy(file).await?;
-    sqlx::query("UPDATE catalog_identity SET id = randomblob(16)")
-        .execute(&mut copy)
-        .await?;
+    for change in [
+        "UPDATE catalog_identity SET id = randomblob(16)",
+        "UPDATE worker SET ended = heartbeat WHERE ended IS NULL",
+    ] {
+        sqlx::query(change).execute(&mut copy).await?;
+    }
     copy.close().await
 }
 
