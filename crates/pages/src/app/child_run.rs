@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
+use super::failed_runs::FailedRuns;
 use super::failure::{AppFailure, AppResult};
 use super::process_end::reason_of_end;
 use super::sentence::{Sentence, system_reasons, without_commands};
@@ -59,23 +60,28 @@ pub(super) async fn start(
         }
     });
     match tokio::time::timeout(WATCHED, &mut ends).await {
-        Ok(Ok(status)) => match failure(status, messages) {
-            Some(why) => {
-                state.failed_runs.set(dir, Some(why.clone()));
-                Err(AppFailure::refused(why))
-            }
-            None => Ok(()),
-        },
+        Ok(Ok(status)) => {
+            let failed = failure(status, messages);
+            store(&state.failed_runs, dir, status, failed.as_ref());
+            failed.map_or(Ok(()), |why| Err(AppFailure::refused(why)))
+        }
         Ok(Err(_)) => Ok(()),
         Err(_) => {
             let (runs, dir) = (state.failed_runs.clone(), dir.to_owned());
             tokio::spawn(async move {
                 if let Ok(status) = ends.await {
-                    runs.set(&dir, failure(status, messages));
+                    store(&runs, &dir, status, failure(status, messages).as_ref());
                 }
             });
             Ok(())
         }
+    }
+}
+
+/// Stores why a run failed, or that it did not. If it found another run at work, which may still fail, stores nothing.
+fn store(runs: &FailedRuns, dir: &Path, status: ExitStatus, why: Option<&Sentence>) {
+    if status.code() != Some(ExitCode::InUse as i32) {
+        runs.set(dir, why.cloned());
     }
 }
 
@@ -245,6 +251,8 @@ mod tests {
     use std::io::Read as _;
     use std::path::Path;
 
+    #[cfg(unix)]
+    use super::{ExitCode, ExitStatus, FailedRuns, store};
     use super::{last_error, name_file, run_command, why};
     use crate::review::Language;
 
@@ -263,6 +271,20 @@ mod tests {
         let all = run_command(Path::new("mocban"), Path::new("p"), &args, &[]);
         let all = all.expect("a command");
         assert!(all.get_args().all(|arg| arg != "--names-from"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_run_that_finds_another_one_at_work_is_no_failed_run() {
+        use std::os::unix::process::ExitStatusExt as _;
+        let (runs, dir) = (FailedRuns::default(), Path::new("p"));
+        let ends_with = |code: ExitCode| {
+            let status = ExitStatus::from_raw((code as i32) << 8);
+            store(&runs, dir, status, Some(&why("the reason")));
+            runs.last(dir)
+        };
+        assert_eq!(ends_with(ExitCode::InUse), None);
+        assert!(ends_with(ExitCode::Error).is_some());
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub(super) struct FailedRuns(Arc<Mutex<BTreeMap<PathBuf, (UnixMillis, Sentence)>
 
 impl FailedRuns {
     /// Returns when the last run of a project failed and why, if it did.
-    fn last(&self, dir: &Path) -> Option<(UnixMillis, Sentence)> {
+    pub(super) fn last(&self, dir: &Path) -> Option<(UnixMillis, Sentence)> {
         locked(&self.0).get(dir).cloned()
     }
 
