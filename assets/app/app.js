@@ -50,7 +50,11 @@ document.addEventListener("click", (event) => {
   link.href = to;
 });
 
-document.querySelector("header a[hreflang]")?.addEventListener("click", showAgain);
+// The listener before this one may have changed the address of the link. With a key, another tab or window opens.
+document.addEventListener("click", (event) => {
+  const link = event.target.closest("header a[hreflang]");
+  if (link && !(event.ctrlKey || event.metaKey || event.shiftKey || event.altKey)) showAgain(link.href);
+});
 
 document.addEventListener("submit", async (event) => {
   const form = event.target;

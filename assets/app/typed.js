@@ -1,9 +1,23 @@
 // Keeps what was typed in forms for the way back to a page, and for the same page in the other language.
 
-const KEPT = `typed ${location.pathname}`;
+/** Parts of an address that only say something about the same page. */
+const PASSING = ["language", "saved", "done", "count", "still_out"];
 /** Names the page that is shown again at once, with what was typed. */
 const AGAIN = "shown again";
 const FIELDS = "form :is(input:not([type=hidden], [type=file], [type=checkbox], [type=radio], [readonly]), select, textarea)";
+
+/** Returns a text that differs between the pages of two addresses. */
+function pageOf(address) {
+  const { pathname, searchParams } = new URL(address, location.href);
+  for (const name of PASSING) searchParams.delete(name);
+  searchParams.sort();
+  return `${pathname}?${searchParams}`;
+}
+
+/** Returns the key of what was typed in a page. */
+function keptAs(page) {
+  return `typed ${page}`;
+}
 
 /** Returns a text that differs between the forms of a page. Each setting has a form; only the hidden values differ. */
 function formName(form) {
@@ -30,23 +44,25 @@ export function forgetTyped(form) {
   form.dataset.sent = "";
 }
 
-/** Says that this page is shown again, so that what was typed stays. */
-export function showAgain() {
-  sessionStorage.setItem(AGAIN, location.pathname);
+/** Says that this page is shown again at an address, so that what was typed stays. */
+export function showAgain(address = location.href) {
+  sessionStorage.setItem(AGAIN, pageOf(address));
 }
 
 function keep() {
+  const kept = keptAs(sessionStorage.getItem(AGAIN) ?? pageOf(location.href));
   const typed = fields().filter(([, field]) => field.value !== made(field));
-  if (typed.length > 0) sessionStorage.setItem(KEPT, JSON.stringify(typed.map(([name, field]) => [name, field.value])));
-  else sessionStorage.removeItem(KEPT);
+  if (typed.length > 0) sessionStorage.setItem(kept, JSON.stringify(typed.map(([name, field]) => [name, field.value])));
+  else sessionStorage.removeItem(kept);
 }
 
 function restore() {
   const [navigation] = performance.getEntriesByType("navigation");
-  const isAgain = sessionStorage.getItem(AGAIN) === location.pathname;
+  const page = pageOf(location.href);
+  const isAgain = sessionStorage.getItem(AGAIN) === page;
   sessionStorage.removeItem(AGAIN);
-  const kept = new Map(JSON.parse(sessionStorage.getItem(KEPT) ?? "[]"));
-  sessionStorage.removeItem(KEPT);
+  const kept = new Map(JSON.parse(sessionStorage.getItem(keptAs(page)) ?? "[]"));
+  sessionStorage.removeItem(keptAs(page));
   if (!isAgain && navigation?.type !== "back_forward") return;
   for (const [name, field] of fields()) {
     const value = kept.get(name);

@@ -108,3 +108,34 @@ fn what_was_typed_stays_on_the_way_back_and_in_the_other_language() {
     tab.wait("performance.getEntriesByType('navigation')[0].loadEventEnd > 0");
     assert_eq!(tab.eval("document.querySelector('#reviewer').value"), "");
 }
+
+#[test]
+fn a_typed_setting_stays_alone_in_the_other_language_and_on_the_way_back() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    read_project(&dir);
+    let page = Page::of(app(dir.path()).args(["--lang", "en"]));
+    let (tab, home) = enter(&browser, &page, [1366, 660]);
+    let field = |index: usize| {
+        format!("document.querySelectorAll('form.setting input[name=value]')[{index}].value")
+    };
+    tab.open(&format!("{home}p/p/settings"));
+    tab.wait(SHOWN);
+    let other = tab.eval(&field(1));
+    tab.eval(&format!("{} = 'typed', null", field(0)));
+    tab.click("header a[hreflang]", false);
+    let in_vietnamese = format!("{SHOWN} && document.documentElement.lang === 'vi'");
+    tab.wait(&format!("{in_vietnamese} && {} === 'typed'", field(0)));
+    assert_eq!(tab.eval(&field(1)), other);
+    // Another page with the same path.
+    tab.eval("location.search = '?key=run.jobs', null");
+    tab.wait(&format!("{SHOWN} && location.search.includes('run.jobs')"));
+    tab.eval("history.back(), null");
+    tab.wait(&format!(
+        "{SHOWN} && !location.search.includes('run.jobs') && {} === 'typed'",
+        field(0)
+    ));
+    assert_eq!(tab.eval(&field(1)), other);
+}
