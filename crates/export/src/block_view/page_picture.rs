@@ -61,6 +61,17 @@ impl DecodedPage {
         })
     }
 
+    /// Reads a page only for its ink. `aligned` is as for [`Self::read`].
+    pub(super) fn read_ink(
+        project: &Project,
+        stored_path: &str,
+        aligned: Option<ContentHash>,
+        limits: &ImageLimits,
+    ) -> Result<PageInk, BlockViewError> {
+        let source = SourcePrint::read_stored(project, stored_path, aligned, limits)?;
+        Ok(PageInk::of(&source.picture)?)
+    }
+
     /// Returns the page of layers, whose ink was taken.
     pub fn of_layers(layers: &PageLayers) -> Self {
         Self {

@@ -141,7 +141,10 @@ impl AlignedBlock {
     pub fn read_layers(&self, page: &DecodedPage) -> Result<PageLayers, BlockViewError> {
         let ink = match page.take_ink() {
             Some(ink) => ink?,
-            None => self.read_page()?.take_ink().expect("it was just decoded")?,
+            None => {
+                let (path, aligned) = (&self.page_path, self.registered.page_hash);
+                DecodedPage::read_ink(&self.project, path, aligned, &self.limits.image)?
+            }
         };
         Ok(PageLayers {
             page: Arc::clone(&page.picture),
