@@ -139,12 +139,11 @@ impl AlignedBlock {
     /// # Errors
     /// Returns an error if the page has no ink, or if the heights cannot be read.
     pub fn read_layers(&self, page: &DecodedPage) -> Result<PageLayers, BlockViewError> {
-        let ink = match page.take_ink() {
-            Some(ink) => ink?,
-            None => {
-                let (path, aligned) = (&self.page_path, self.registered.page_hash);
-                DecodedPage::read_ink(&self.project, path, aligned, &self.limits.image)?
-            }
+        let ink = if let Some(ink) = page.take_ink() {
+            ink?
+        } else {
+            let (path, aligned) = (&self.page_path, self.registered.page_hash);
+            DecodedPage::read_ink(&self.project, path, aligned, &self.limits.image)?
         };
         Ok(PageLayers {
             page: Arc::clone(&page.picture),
