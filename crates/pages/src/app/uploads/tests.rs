@@ -49,12 +49,12 @@ fn an_upload_is_not_cancelled_while_it_is_stored_and_ends_after_a_panic() {
     upload.cancel().expect("nothing to do");
 }
 
-/// Sends a whole scan, and then these pieces of an archive, whose page is then closed. `free_bytes` is called before the archive
-/// is unpacked. Returns the upload once its thread has put back the files.
+/// Sends a whole scan, and then these pieces of an archive. The page is closed at the gate, if there is one. `free_bytes` is called
+/// before the archive is unpacked. Returns the upload once its thread has put back the files.
 async fn closed_during(
     pieces: Vec<FilePiece>,
     free_bytes: fn(&Path) -> Option<u64>,
-    on_close: impl FnOnce(),
+    gate: Option<&Barrier>,
 ) -> (tempfile::TempDir, Arc<FileUpload>) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let uploads = Uploads::new(dir.path());
@@ -78,8 +78,14 @@ async fn closed_during(
         let settled = upload.settled.notified();
         tokio::pin!(settled);
         settled.as_mut().enable();
+        let wait = || {
+            if let Some(gate) = gate {
+                gate.wait();
+            }
+        };
+        wait();
         drop(file);
-        on_close();
+        wait();
         settled.await;
     }
     (dir, upload)
@@ -91,13 +97,11 @@ async fn a_page_that_is_closed_while_an_archive_is_unpacked_loses_nothing() {
     let whole = Bytes::from(archive(&[("3.stl", "solid")], true));
     let wait: fn(&Path) -> Option<u64> = |_| {
         CLOSED.wait();
+        CLOSED.wait();
         None
     };
     let pieces = vec![FilePiece::Bytes(whole.clone()), FilePiece::End];
-    let on_close = || {
-        CLOSED.wait();
-    };
-    let (_dir, upload) = closed_during(pieces, wait, on_close).await;
+    let (_dir, upload) = closed_during(pieces, wait, Some(&CLOSED)).await;
     assert_eq!(upload.problem(), None);
     let placed = upload.finish().await.expect("both have arrived");
     for scan in ["1.stl", "3.stl"] {
@@ -108,7 +112,7 @@ async fn a_page_that_is_closed_while_an_archive_is_unpacked_loses_nothing() {
 #[tokio::test]
 async fn a_page_that_is_closed_before_the_end_of_a_file_can_resume() {
     let pieces = vec![FilePiece::Bytes(Bytes::from_static(b"PK"))];
-    let (_dir, upload) = closed_during(pieces, |_| None, || {}).await;
+    let (_dir, upload) = closed_during(pieces, |_| None, None).await;
     assert_eq!(upload.problem(), Some(cut_with_rest(1)));
     let kept = upload.give_up().expect("the scan");
     assert_eq!(kept.arrived().len(), 1);
@@ -162,8 +166,8 @@ async fn an_upload_whose_page_is_closed_can_be_cancelled_while_an_archive_is_unp
         let settled = upload.settled.notified();
         tokio::pin!(settled);
         settled.as_mut().enable();
-        drop(file);
         CANCELLED.wait();
+        drop(file);
         upload.cancel().expect("it is not stored");
         CANCELLED.wait();
         settled.await;
