@@ -130,7 +130,7 @@ fn a_typed_setting_stays_alone_in_the_other_language_and_on_the_way_back() {
     tab.wait(&format!("{in_vietnamese} && {} === 'typed'", field(0)));
     assert_eq!(tab.eval(&field(1)), other);
     // Another page with the same path.
-    tab.eval("location.search = '?key=run.jobs', null");
+    tab.eval("setTimeout(() => { location.search = '?key=run.jobs'; }), null");
     tab.wait(&format!("{SHOWN} && location.search.includes('run.jobs')"));
     tab.eval("history.back(), null");
     tab.wait(&format!(
