@@ -12,8 +12,8 @@
 //! files without a row.
 //!
 //! # A lost lease
-//! Files of the catalog are below `crates/catalog/src`. Names in capitals are statements of `queue/lease.rs`, but `RECOVER`
-//! and `OVERDUE` of `lease_recovery.rs`, and `DUE` of `queue/claim.rs`.
+//! Files of the catalog: `src/` is in `crates/catalog`, `queue/` in its `src`, and `commit/` in `queue/`. Names in
+//! capitals are statements of `queue/lease.rs`, but `RECOVER` and `OVERDUE` of `src/lease_recovery.rs`, `DUE` of `queue/claim.rs`.
 //! ```text
 //!   ready ---- claim: queue/claim.rs ----> leased ------ ADVANCE of the last stage ----> done
 //!     ^                                            |
@@ -50,10 +50,10 @@
 //! waits, and `stored_before` (`queue/lease.rs`) finds what was stored without a reply.
 //!
 //! Read 18 files to follow a lease. Pairs: `run_context.rs`, `worker_session.rs`, `scheduler.rs`, `prefetch.rs`, `pair_task.rs`,
-//! `checkpointer.rs`; in the catalog `worker_requests.rs`, `lease_recovery.rs`, and in `queue` `kind.rs`, `lease.rs`, `claim.rs`,
-//! `checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL `commit/write_connection.rs`,
-//! `server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Others take leases away: the start of a run
-//! (`run.rs`), `send_back` in `jobs/requeue.rs`, `jobs/retired.rs`, `audit/repair.rs`, `blocks/cut.rs`.
+//! `checkpointer.rs`; in the catalog `src/worker_requests.rs`, `src/lease_recovery.rs`, `queue/kind.rs`, `queue/lease.rs`,
+//! `queue/claim.rs`, `queue/checkpoint.rs`, `commit/writer.rs`, `commit/group_commit.rs`; for PostgreSQL
+//! `commit/write_connection.rs`, `queue/server_checkpoint.rs`. Blocks: `block/task.rs`, `block/checkpoint.rs`. Leases are also
+//! taken away by `run.rs`, `jobs/requeue.rs` (`send_back`), `jobs/retired.rs`, `audit/repair.rs` and `blocks/cut.rs`.
 //!
 //! **Cancellation.** A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner
 //! loops poll the token of their thread ([`mocban_core::domain::cancel`]) and unwind to `pair_task.rs` (`block/task.rs`), which
