@@ -138,7 +138,7 @@ pub fn png_rgb8_of(grid: &Grid<[u8; 3]>, software: &str) -> Vec<u8> {
 /// let png = compact_rgb8(&enlarged);
 /// assert!(png.len() < png_rgb8(&enlarged).len());
 /// let read = decode(&png, &ImageLimits::SUGGESTED)?.rgb;
-/// assert_eq!(read, enlarged.map(|colour| colour.map(|value| u16::from(value) * 257)));
+/// assert_eq!(*read.to_rgb8(), enlarged);
 /// # Ok::<(), mocban_core::raster::DecodeError>(())
 /// ```
 pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
