@@ -128,7 +128,7 @@ fn an_upload_says_that_the_app_ended_and_the_next_app_takes_the_same_files() {
         assert!(shown.to_string().contains(said), "{shown}");
         let next = Page::of(app(dir.path()).args(["--lang", "en"]));
         let (tab, home) = enter(&browser, &next, [1366, 660]);
-        // An app that is asked to stop removes what has arrived by itself.
+        // On SIGTERM, the app removes the files that have arrived.
         if signal == Signal::KILL {
             let shown = tab.eval("document.querySelector('#upload-last').textContent");
             let said = "the program ended before the last upload was stored";

@@ -21,8 +21,8 @@ const USUAL_MM: f64 = 50.0;
 /// normals or texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
-/// Bytes needed per pixel of a print. Measured with grey and colour images: at most 27 with 1.9 million pixels, 2 to 6 with
-/// 16 to 144 million, whose masks are smaller. A long, narrow print has masks of its own size.
+/// Bytes needed per pixel of a print. Measured with grey and colour images: at most 27 with 1.9 million pixels, 1 to 6 besides
+/// the file with 16 to 144 million, whose masks are smaller. A long, narrow print has masks of its own size.
 const PIXEL_BYTES: u64 = 30;
 /// Pixels assumed for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;

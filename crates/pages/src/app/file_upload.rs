@@ -284,8 +284,8 @@ impl FileUpload {
         }
     }
 
-    /// Interrupts the upload because its page was closed, so that another page can resume it. A file that a thread has first
-    /// comes to its end. Without files that could be resumed, the upload stays as it is.
+    /// Interrupts the upload because its page was closed, so that another page can resume it. A file that a thread
+    /// writes is finished first. Without files that could be resumed, the upload stays as it is.
     pub(super) fn pause(&self) {
         let mut state = self.lock();
         self.is_left.store(true, Ordering::Relaxed);

@@ -9,7 +9,7 @@ use super::projects::OpenProject;
 use super::visit::Visit;
 use mocban_core::domain::{FailureClass, PairName, one_line};
 
-/// Failures of the class among which pairs are searched: all that a project may have.
+/// Most failures of the class that are looked through for pairs. No project has more.
 const SEARCHED: usize = i32::MAX as usize;
 /// Most pairs that are named.
 const SHOWN: usize = 60;

@@ -65,7 +65,8 @@ impl Uploads {
     }
 
     /// Begins an upload, or resumes an interrupted one of the same files. Removes uploads that ended or were abandoned, and
-    /// interrupted ones if the disk has no room without that. Returns the number of the upload, and the files that need not be sent again. Waits for the disk.
+    /// interrupted ones if the disk has no room without that. Returns the number of the upload, and the files that need not be
+    /// sent again. Waits for the disk.
     ///
     /// # Errors
     /// Refuses too many files, more bytes than the disk has room for, and files that another page is sending.

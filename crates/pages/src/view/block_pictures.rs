@@ -15,8 +15,8 @@ use mocban_project::ProjectError;
 /// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
 /// part and so never have fewer pixels.
 const LONGEST_SIDE: usize = 3000;
-/// Longer side of the image of the whole page, which is seen first, pixels. It is sharp in a window of this size, and is encoded
-/// in a fifth of the time; larger windows and closer views then ask for regions.
+/// Longer side of the image of the whole page, which is seen first, pixels. It is sharp in a window of this size, and has a
+/// fifth of the pixels; larger windows and closer views then ask for regions.
 const FIRST_SIDE: usize = 1280;
 
 /// An aligned block, with the pictures of it that were asked for.

@@ -1,4 +1,4 @@
-//! An aligned block whose page is open: what is read for it before it is asked for.
+//! An aligned block whose page is open, and its pictures that are read ahead of requests.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,12 +12,12 @@ use crate::local_server::WorkThread;
 use mocban_core::locked;
 use mocban_export::block_view::{AlignedBlock, BlockView, PageLayer, PageRegion};
 
-/// Work before it is asked for. It is cancelled when this is dropped.
+/// Tasks that read ahead of requests. They are cancelled when this is dropped.
 #[derive(Debug, Default)]
-struct EarlyWork(Mutex<JoinSet<()>>);
+struct ReadAhead(Mutex<JoinSet<()>>);
 
-impl EarlyWork {
-    /// Begins work. What it returns is asked for later, also why it failed.
+impl ReadAhead {
+    /// Starts a task. Its result, or its error, is returned by the request for the same picture.
     fn begin<T>(&self, work: impl Future<Output = T> + Send + 'static) {
         let work = async move {
             work.await;
@@ -30,18 +30,18 @@ impl EarlyWork {
 #[derive(Debug)]
 pub(super) struct ShownBlock {
     pub(super) pictures: Arc<BlockPictures>,
-    early: EarlyWork,
+    read_ahead: ReadAhead,
     /// Whether the layers were read or are being read.
     has_layers: AtomicBool,
 }
 
 impl ShownBlock {
-    /// Begins to draw the page, so that its picture is there earlier than if its request began it.
+    /// Begins to draw the page, before the browser asks for its picture.
     pub(super) fn begin(block: AlignedBlock, dir: PathBuf, work: Arc<WorkThread>) -> Arc<Self> {
         let shown = Self::with(BlockPictures::new(block, dir, work), false);
         let first = Arc::clone(&shown.pictures);
         shown
-            .early
+            .read_ahead
             .begin(async move { first.overview(PageLayer::Page).await });
         shown
     }
@@ -54,7 +54,7 @@ impl ShownBlock {
     fn with(pictures: Arc<BlockPictures>, has_layers: bool) -> Arc<Self> {
         Arc::new(Self {
             pictures,
-            early: EarlyWork::default(),
+            read_ahead: ReadAhead::default(),
             has_layers: AtomicBool::new(has_layers),
         })
     }
@@ -64,7 +64,8 @@ impl ShownBlock {
     pub(super) fn read_layers(&self) {
         if !self.has_layers.swap(true, Ordering::Relaxed) {
             let pictures = Arc::clone(&self.pictures);
-            self.early.begin(async move { pictures.layers().await });
+            self.read_ahead
+                .begin(async move { pictures.layers().await });
         }
     }
 
@@ -84,20 +85,20 @@ impl ShownBlock {
 mod tests {
     use tokio::sync::oneshot;
 
-    use super::EarlyWork;
+    use super::ReadAhead;
 
     #[tokio::test]
-    async fn early_work_ends_with_the_page() {
-        let early = EarlyWork::default();
+    async fn reading_ahead_ends_with_the_page() {
+        let read_ahead = ReadAhead::default();
         let (begun, begins) = oneshot::channel();
         let (held, ended) = oneshot::channel::<()>();
-        early.begin(async move {
+        read_ahead.begin(async move {
             let _held = held;
             begun.send(()).expect("a receiver");
             std::future::pending::<()>().await;
         });
         begins.await.expect("it begins");
-        drop(early);
+        drop(read_ahead);
         ended.await.expect_err("nothing is sent any more");
     }
 }
