@@ -297,7 +297,7 @@ fn locate(
     let (line, name) = (row.line, row.name.clone());
     let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();
     for (kind, path) in required.chain(row.labels.as_mut().map(|path| ("labels", path))) {
-        if let Some(line) = locate_file((label, line), kind, path, &name, project, searches) {
+        if let Err(line) = locate_file((label, line), kind, path, &name, project, searches) {
             missing.add(line);
         }
     }

@@ -25,7 +25,7 @@ use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_core::locked;
 use mocban_lists::manifest::{ManifestRow, RowIds};
-use mocban_store::Project;
+use mocban_store::{Project, StoredPaths};
 use mocban_system::failpoint::{self, Point};
 
 /// Maximum number of chunks of rows that wait for the catalog.
@@ -198,6 +198,7 @@ fn spool(
 ) -> ProjectResult<(RowSpool, MissingFiles, Vec<String>)> {
     let failed = || "cannot write a temporary file for the list".to_owned();
     let mut spool = RowSpool::new().with_context(failed)?;
+    let mut paths = StoredPaths::new(project)?;
     let mut missing = MissingFiles::default();
     let mut outcome = Ok(());
     let mut count = 0_u64;
@@ -211,7 +212,7 @@ fn spool(
         }
         if outcome.is_ok() {
             outcome =
-                stored_row(&row, project).and_then(|row| spool.push(&row).with_context(failed));
+                stored_row(&row, &mut paths).and_then(|row| spool.push(&row).with_context(failed));
         }
     });
     if let Some(refused) = &listing.refused {
@@ -298,11 +299,11 @@ fn stored_truths(
         .collect()
 }
 
-fn stored_row(row: &ManifestRow, project: &Project) -> ProjectResult<ImportRow> {
+fn stored_row(row: &ManifestRow, paths: &mut StoredPaths<'_>) -> ProjectResult<ImportRow> {
     Ok(ImportRow {
         name: row.name.clone(),
-        mesh_path: project.stored_path(&row.mesh)?,
-        print_path: project.stored_path(&row.print)?,
+        mesh_path: paths.stored(&row.mesh)?,
+        print_path: paths.stored(&row.print)?,
         unit: row.unit,
         scanned_face_down: row.scanned_face_down,
         character: row.character.clone(),

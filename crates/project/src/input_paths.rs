@@ -1,28 +1,57 @@
 //! Finds the files of a list under the names that they have on disk.
 
+use std::fs::Metadata;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use mocban_core::domain::NO_BREAK_SPACES;
 use mocban_core::domain::spelling::{composed, edit_distance, plain_form};
 use mocban_lists::manifest::{is_named_like_mesh, is_named_like_print};
+use mocban_store::Project;
 use unicode_normalization::UnicodeNormalization as _;
+
+/// A file that exists.
+#[derive(Debug)]
+pub(crate) struct FoundFile {
+    pub(crate) place: PathBuf,
+    /// What the file system says of it. Unknown in an object store.
+    pub(crate) meta: Option<Metadata>,
+}
+
+/// Looks for a file once: a list may have millions of rows.
+pub(crate) fn look_for(path: &mut PathBuf, project: &Project) -> io::Result<Option<FoundFile>> {
+    let Some(stored) = path.to_str().filter(|path| project.is_below_root(path)) else {
+        let meta = find_on_disk(path)?;
+        return Ok(meta.map(|meta| FoundFile {
+            place: path.clone(),
+            meta: Some(meta),
+        }));
+    };
+    Ok(project.input(stored).exists().then(|| {
+        let place = project.input_path(stored);
+        let meta = place.metadata().ok();
+        FoundFile { place, meta }
+    }))
+}
 
 /// Replaces the path of a file whose name is written differently in a list by its path on disk: with the other Unicode
 /// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), without the backslashes of
-/// Windows, or with plain spaces for the no-break spaces of text programs. Returns whether the file exists.
+/// Windows, or with plain spaces for the no-break spaces of text programs. Returns what the file system says of the file, or
+/// `None` if it does not exist.
 ///
 /// # Errors
 /// Returns an error if this cannot be found out, such as for a folder that cannot be entered.
-pub fn find_on_disk(path: &mut PathBuf) -> io::Result<bool> {
-    if path.try_exists()? {
-        return Ok(true);
+pub fn find_on_disk(path: &mut PathBuf) -> io::Result<Option<Metadata>> {
+    match path.metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        found => return found.map(Some),
     }
-    let found = written_differently(path);
-    if let Some(found) = &found {
-        path.clone_from(found);
-    }
-    Ok(found.is_some())
+    let Some(found) = written_differently(path) else {
+        return Ok(None);
+    };
+    let meta = found.metadata()?;
+    *path = found;
+    Ok(Some(meta))
 }
 
 /// Returns the path of a file whose name is written differently.
@@ -194,16 +223,19 @@ mod tests {
             format!("{decomposed}/{composed}.stl"),
         ] {
             let mut path = dir.path().join(&written);
-            assert!(find_on_disk(&mut path).expect("readable"), "{written}");
+            assert!(
+                find_on_disk(&mut path).expect("readable").is_some(),
+                "{written}"
+            );
             assert_eq!(path, file, "{written}");
         }
         fs::write(dir.path().join("tờ 3.stl"), "").expect("written");
         let mut path = dir.path().join("tờ\u{a0}3.stl");
-        assert!(find_on_disk(&mut path).expect("readable"));
+        assert!(find_on_disk(&mut path).expect("readable").is_some());
         assert_eq!(path, dir.path().join("tờ 3.stl"));
         let other = dir.path().join("other.stl");
         let mut path = other.clone();
-        assert!(!find_on_disk(&mut path).expect("readable"));
+        assert!(find_on_disk(&mut path).expect("readable").is_none());
         assert_eq!(path, other);
     }
 

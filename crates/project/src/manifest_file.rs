@@ -237,14 +237,22 @@ impl Listing {
     ) -> ListedRows {
         let mut searches = FileSearches::default();
         let mut each = |mut row: ManifestRow| {
-            searches.add_paths(&row, project);
-            let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
+            let has_two_paths = row.mesh.as_os_str() != row.print.as_os_str();
             let place = (self.row_label.as_str(), row.line);
-            let missing = files
-                .filter_map(|(kind, path)| {
-                    locate_file(place, kind, path, &row.name, project, &mut searches)
-                })
-                .collect();
+            let mut locate =
+                |kind, path| locate_file(place, kind, path, &row.name, project, &mut searches);
+            let mesh = locate("mesh", &mut row.mesh);
+            let print = locate("print", &mut row.print);
+            let missing = match (mesh, print) {
+                (Ok(mesh), Ok(print)) => {
+                    if has_two_paths {
+                        let files = [mesh, print];
+                        searches.linked.add(row.line, row.name.as_str(), &files);
+                    }
+                    Vec::new()
+                }
+                (mesh, print) => [mesh.err(), print.err()].into_iter().flatten().collect(),
+            };
             each(row, missing);
         };
         let hash = match &self.source {

@@ -1,11 +1,12 @@
 //! Files of a list that do not exist.
 
 use std::fmt::Display;
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files::listed;
-use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
+use super::input_paths::{FoundFile, SimilarFiles, is_windows_path, look_for};
 use super::unusable_files::FileSearches;
 use mocban_core::domain::{first_names, sanitize};
 use mocban_store::Project;
@@ -31,8 +32,10 @@ const TAB_HINT: &str = "; its path has a tab: remove it";
 /// Ends the message of a path that leads to a folder.
 const IS_FOLDER: &str = "is a folder, not a file";
 
-/// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
-/// row with a label and a number; returns `None` if it exists. Counts files that cannot be inputs.
+/// Replaces the path of a row's file by its path on disk, and returns the file. Counts files that cannot be inputs.
+///
+/// # Errors
+/// Returns a message about a file that does not exist or cannot be read, at a row with a label and a number.
 pub(crate) fn locate_file(
     (label, line): (&str, usize),
     kind: &str,
@@ -40,39 +43,28 @@ pub(crate) fn locate_file(
     name: &dyn Display,
     project: &Project,
     searches: &mut FileSearches,
-) -> Option<String> {
-    let exists = match path.to_str() {
-        Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
-        _ => find_on_disk(path),
-    };
-    let problem = match exists {
-        Ok(true) => {
-            let place = place_of(path, project);
-            match place.metadata() {
-                Ok(meta) if meta.is_dir() => IS_FOLDER.to_owned(),
-                Ok(meta) => {
-                    searches.unusable.add(&place, &meta);
-                    return None;
-                }
-                // It may be in an object store.
-                Err(_) => return None,
-            }
+) -> Result<FoundFile, String> {
+    let problem = match look_for(path, project) {
+        Ok(Some(file)) if file.meta.as_ref().is_some_and(Metadata::is_dir) => IS_FOLDER.to_owned(),
+        Ok(Some(file)) => {
+            searches.unusable.add(&file);
+            return Ok(file);
         }
-        Ok(false) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
-        Ok(false) if has_scheme(path, "file://") => {
+        Ok(None) if path.is_symlink() => "is a link to a file that does not exist".to_owned(),
+        Ok(None) if has_scheme(path, "file://") => {
             "does not exist; write its path without file://".to_owned()
         }
-        Ok(false) if has_scheme(path, "://") => {
+        Ok(None) if has_scheme(path, "://") => {
             "is a web address; download the file and write the path of the copy".to_owned()
         }
-        Ok(false) => format!(
+        Ok(None) => format!(
             "does not exist{}",
             missing_hint(path, &mut searches.similar)
         ),
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
-    Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
+    Err(format!("{label} {line}: {kind} {path} of {name} {problem}"))
 }
 
 /// Returns the place of a file, which may be below a named root.

@@ -1,8 +1,10 @@
 //! Says once per format, instead of once per file, that files of a folder or a list are not read.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
+use super::input_paths::FoundFile;
 use mocban_core::domain::FileKind;
 use mocban_core::domain::spelling::quoted;
 use mocban_lists::manifest::ManifestRow;
@@ -174,13 +176,13 @@ pub(crate) struct OneFileRows {
 
 impl OneFileRows {
     /// Looks at a row whose paths differ, but may lead to one file, also through links.
-    pub(crate) fn add(&mut self, line: usize, id: &str, files: &[PathBuf; 2]) {
+    pub(crate) fn add(&mut self, line: usize, id: &str, files: &[FoundFile; 2]) {
         // Few rows have a mesh and a print of the same length, and only for these are links followed.
-        let [mesh, print] = [0, 1].map(|at| files[at].metadata().map(|meta| meta.len()).ok());
+        let [mesh, print] = [0, 1].map(|at| files[at].meta.as_ref().map(Metadata::len));
         if mesh.is_none() || mesh != print {
             return;
         }
-        let [mesh, print] = [0, 1].map(|at| files[at].canonicalize().ok());
+        let [mesh, print] = [0, 1].map(|at| files[at].place.canonicalize().ok());
         if mesh.is_some() && mesh == print {
             self.count(line, id);
         }
@@ -281,9 +283,17 @@ mod tests {
     #[test]
     fn a_file_that_is_mesh_and_print_is_named_under_other_paths() {
         use super::OneFileRows;
+        use crate::input_paths::FoundFile;
 
         let dir = tempfile::tempdir().expect("a temporary directory");
         let place = |name: &str| dir.path().join(name);
+        let found = |name: &str| {
+            let meta = place(name).metadata().ok();
+            FoundFile {
+                place: place(name),
+                meta,
+            }
+        };
         for (name, content) in [("a.stl", "mesh"), ("a.png", "png"), ("b.png", "mesh")] {
             std::fs::write(place(name), content).expect("written");
         }
@@ -293,7 +303,7 @@ mod tests {
         for (line, print) in
             (2..).zip(["a.png", "b.png", "./a.stl", "link.png", "here/a.stl", "no"])
         {
-            rows.add(line, print, &[place("a.stl"), place(print)]);
+            rows.add(line, print, &[found("a.stl"), found(print)]);
         }
         assert_eq!(
             rows.warning().as_deref(),

@@ -1,16 +1,14 @@
 //! Files of a list that cannot be inputs: pointers of Git LFS, in whose place the content was not fetched, empty files,
 //! archives, files of zeros, and files that cannot be read.
 
-use std::fs::Metadata;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use super::files::kind;
-use super::input_paths::SimilarFiles;
+use super::input_paths::{FoundFile, SimilarFiles};
 use super::unread_files::{OneFileRows, archive_kind};
 use mocban_core::domain::{FileKind, has_only_zeros, sanitize};
-use mocban_lists::manifest::ManifestRow;
-use mocban_store::{Project, open_regular};
+use mocban_store::open_regular;
 
 /// Longest pointer in bytes. The specification of Git LFS demands fewer than 1024.
 const MAX_POINTER_BYTES: u64 = 1024;
@@ -28,19 +26,6 @@ pub(crate) struct FileSearches {
 }
 
 impl FileSearches {
-    /// Looks at the paths of a pair, which may lead to one file although they differ.
-    pub(crate) fn add_paths(&mut self, row: &ManifestRow, project: &Project) {
-        if row.mesh.as_os_str() == row.print.as_os_str() {
-            return;
-        }
-        let place = |path: &Path| match path.to_str() {
-            Some(stored) if project.is_below_root(stored) => project.input_path(stored),
-            _ => path.to_owned(),
-        };
-        let files = [&row.mesh, &row.print].map(|path| place(path));
-        self.linked.add(row.line, row.name.as_str(), &files);
-    }
-
     /// Returns warnings about what was found.
     pub(crate) fn warnings(self) -> Vec<String> {
         let mut warnings = self.unusable.warnings();
@@ -80,10 +65,11 @@ impl CountedFiles {
 
 impl UnusableFiles {
     /// Looks at a file.
-    pub(crate) fn add(&mut self, path: &Path, meta: &Metadata) {
-        if !meta.is_file() {
+    pub(crate) fn add(&mut self, file: &FoundFile) {
+        let path = file.place.as_path();
+        let Some(meta) = file.meta.as_ref().filter(|meta| meta.is_file()) else {
             return;
-        }
+        };
         if meta.len() == 0 {
             self.empty.add(path);
             return;
@@ -169,6 +155,7 @@ fn is_of_zeros(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::UnusableFiles;
+    use crate::input_paths::FoundFile;
 
     #[test]
     fn files_that_cannot_be_inputs_are_counted_with_the_first() {
@@ -189,8 +176,8 @@ mod tests {
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, content).expect("written");
-            let meta = path.metadata().expect("a file");
-            found.add(&path, &meta);
+            let meta = path.metadata().ok();
+            found.add(&FoundFile { place: path, meta });
         }
         let place = |name: &str| dir.path().join(name).display().to_string();
         let [first, empty, archive, zeros] = ["b.stl", "c.png", "d.stl", "f.stl"].map(place);

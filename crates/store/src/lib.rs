@@ -37,6 +37,7 @@ mod referenced;
 mod remote;
 mod replacement_folder;
 mod staging;
+mod stored_paths;
 mod target_lock;
 
 pub use artifact_error::ArtifactError;
@@ -56,4 +57,5 @@ pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 pub use remote::{BucketError, ProjectStorage, StorageError, StorageOptions};
 pub use replacement_folder::{Leftover, ReplaceError, ReplacementFolder};
 pub use staging::StagingFolder;
+pub use stored_paths::StoredPaths;
 pub use target_lock::{TargetLock, TargetLockError};

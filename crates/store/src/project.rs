@@ -7,7 +7,7 @@ use super::create_folders::create_folders;
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
 use mocban_core::domain::{ARTIFACTS, CATALOG_FILE, ErrorCode, Explained};
-use mocban_system::platform::{FileId, stat, with_slashes};
+use mocban_system::platform::{FileId, stat};
 
 /// Name of the settings file in a project.
 pub const SETTINGS_FILE: &str = "mocban.toml";
@@ -179,36 +179,6 @@ impl Project {
         }
         Ok(None)
     }
-
-    /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is
-    /// a path that already has this form, such as `scans:1/mesh.obj`. A path below the project is stored relative to
-    /// the project, so that the project can be moved with its data. Any other path is stored as absolute. A file has the
-    /// same form however its folders are written, such as `lists/../scans/1.stl`. The file need not exist.
-    ///
-    /// # Errors
-    /// Returns an error if the working directory is unknown, or the path is not UTF-8.
-    pub fn stored_path(&self, path: &Path) -> Result<String, StoreError> {
-        if let Some(text) = path.to_str().filter(|text| self.is_below_root(text)) {
-            return Ok(text.to_owned());
-        }
-        let absolute = plain_absolute(path).map_err(StoreError::io(path))?;
-        if let Some(below) = self
-            .storage()
-            .and_then(|storage| storage.path_below_root(&absolute))
-        {
-            return Ok(with_slashes(below));
-        }
-        let dir = plain_absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
-        let stored = match absolute.strip_prefix(&dir) {
-            Ok(below) => below.to_owned(),
-            Err(_) => below_resolved(&absolute, &dir).unwrap_or(absolute),
-        };
-        match stored.to_str() {
-            Some(text) if stored.is_relative() => Ok(with_slashes(text.to_owned())),
-            Some(text) => Ok(text.to_owned()),
-            None => Err(StoreError::NotUtf8(stored)),
-        }
-    }
 }
 
 /// Returns whether a path exists. A path below a file, and one that no folder can hold, do not.
@@ -222,70 +192,11 @@ fn exists(path: &Path) -> std::io::Result<bool> {
     }
 }
 
-/// Returns an absolute path without `..` and the folder before it, unless this folder is a link, which may lead elsewhere.
-fn plain_absolute(path: &Path) -> std::io::Result<PathBuf> {
-    let mut plain = PathBuf::new();
-    for part in std::path::absolute(path)?.components() {
-        if part == Component::ParentDir && plain.file_name().is_some() && !plain.is_symlink() {
-            plain.pop();
-        } else {
-            plain.push(part);
-        }
-    }
-    Ok(plain)
-}
-
-/// Returns the path relative to `dir` after links are resolved, or `None` if it does not exist or is not below `dir`.
-fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
-    let path = path.canonicalize().ok()?;
-    let dir = dir.canonicalize().ok()?;
-    Some(path.strip_prefix(dir).ok()?.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
     use super::{Project, StoreError};
-
-    #[test]
-    fn a_file_is_stored_under_one_path_however_its_folders_are_written() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let project = Project::create(&dir.path().join("project")).expect("a project");
-        let stored = |path: &str| project.stored_path(&dir.path().join(path)).expect("a path");
-        assert_eq!(stored("lists/../scans/./1.stl"), stored("scans/1.stl"));
-        assert_eq!(stored("a/b/../../scans/1.stl"), stored("scans/1.stl"));
-        assert_eq!(stored("lists/../project/data/1.stl"), "data/1.stl");
-        let project = Project::at(&dir.path().join("lists/../project"));
-        let inside = project.stored_path(&dir.path().join("project/data/1.stl"));
-        assert_eq!(inside.expect("a path"), "data/1.stl");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn the_folder_above_a_link_is_that_of_its_target() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let project = Project::create(&dir.path().join("project")).expect("a project");
-        std::fs::create_dir_all(dir.path().join("disk/lists")).expect("folders");
-        std::os::unix::fs::symlink("disk/lists", dir.path().join("lists")).expect("a link");
-        let path = dir.path().join("lists/../1.stl");
-        let stored = project.stored_path(&path).expect("a path");
-        assert_eq!(Path::new(&stored), path);
-    }
-
-    #[test]
-    fn a_file_below_the_project_is_stored_relative_to_it() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let project = Project::create(&dir.path().join("project")).expect("a project");
-        let inside = project.dir().join("data/1.stl");
-        let stored = project.stored_path(&inside).expect("a path");
-        assert_eq!(stored, "data/1.stl");
-        assert_eq!(project.input_path(&stored), inside);
-        let outside = dir.path().join("scans/1.stl");
-        let stored = project.stored_path(&outside).expect("a path");
-        assert_eq!(Path::new(&stored), outside);
-        assert_eq!(project.input_path(&stored), outside);
-    }
 
     #[test]
     fn a_moved_input_is_found_by_the_end_of_its_path() {
