@@ -194,8 +194,6 @@ fn exists(path: &Path) -> std::io::Result<bool> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::{Project, StoreError};
 
     #[test]
