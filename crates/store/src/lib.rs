@@ -16,6 +16,7 @@
 
 mod artifact_error;
 mod artifact_object;
+mod artifact_writer;
 mod artifacts;
 mod artifacts_place;
 mod atomic_write;
