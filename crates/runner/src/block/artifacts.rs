@@ -18,8 +18,8 @@ pub(crate) struct StageArtifacts<'a> {
     block: &'a BlockName,
     stage: BlockStage,
     written: Mutex<ArtifactSet>,
-    /// Artifacts for the pack.
-    packed: Mutex<Vec<NewArtifact>>,
+    /// Artifacts for the pack of an object store, or those that a folder gets next.
+    waiting: Mutex<WaitingArtifacts>,
     /// When the first file was written.
     began: OnceLock<Instant>,
 }
@@ -32,24 +32,26 @@ impl<'a> StageArtifacts<'a> {
             block,
             stage,
             written: Mutex::default(),
-            packed: Mutex::default(),
+            waiting: Mutex::default(),
             began: OnceLock::new(),
         }
     }
 
-    /// Stores the pack. Returns the artifacts that were written, by role, and when the first write began.
+    /// Stores what waits. Returns the artifacts that were written, by role, and when the first write began.
     pub(crate) fn finish(self) -> Result<(ArtifactSet, Instant), BlockStageError> {
         let began = *self.began.get_or_init(Instant::now);
+        let waiting = std::mem::take(&mut *locked(&self.waiting)).files;
+        if !self.project.has_packs() {
+            self.write_files(&waiting)?;
+        }
         let written = self.written.into_inner();
         let mut written = written.unwrap_or_else(PoisonError::into_inner);
-        let packed = self.packed.into_inner();
-        let packed = packed.unwrap_or_else(PoisonError::into_inner);
-        if packed.is_empty() {
+        if !self.project.has_packs() || waiting.is_empty() {
             return Ok((written, began));
         }
         failpoint::hit(self.stage, Point::Written, Some(self.block));
-        let locations = self.project.write_pack(&packed).map_err(unwritten)?;
-        for (file, location) in packed.iter().zip(locations) {
+        let locations = self.project.write_pack(&waiting).map_err(unwritten)?;
+        for (file, location) in waiting.iter().zip(locations) {
             if let Some(artifact) = written.get_mut(file.role()) {
                 artifact.pack = Some(location);
             }
@@ -57,23 +59,47 @@ impl<'a> StageArtifacts<'a> {
         Ok((written, began))
     }
 
-    /// Writes an artifact, or keeps it for the pack.
+    /// Writes an artifact or keeps it, until there are enough to be written together or the pack is complete.
     fn store(&self, file: NewArtifact) -> Result<(), BlockStageError> {
-        let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
-        if !self.project.has_packs() || self.stage == BlockStage::Cut {
+        let has_packs = self.project.has_packs();
+        if !has_packs || self.stage == BlockStage::Cut {
             self.began.get_or_init(Instant::now);
         }
-        if !self.project.has_packs() {
-            let files = std::slice::from_ref(&file);
-            return (self.project.write_artifacts(files, &on_written)).map_err(unwritten);
-        }
-        if self.stage == BlockStage::Cut {
-            on_written();
+        if has_packs && self.stage == BlockStage::Cut {
+            failpoint::hit(self.stage, Point::Written, Some(self.block));
             return self.project.write_objects(&[file]).map_err(unwritten);
         }
-        let mut packed = locked(&self.packed);
-        packed.push(file);
-        Ok(())
+        let mut waiting = locked(&self.waiting);
+        waiting.bytes += file.reference().bytes;
+        waiting.files.push(file);
+        if has_packs || !waiting.are_enough() {
+            return Ok(());
+        }
+        let files = std::mem::take(&mut *waiting).files;
+        drop(waiting);
+        self.write_files(&files)
+    }
+
+    /// Writes artifacts to the project's folder.
+    fn write_files(&self, files: &[NewArtifact]) -> Result<(), BlockStageError> {
+        let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
+        let written = self.project.write_artifacts(files, &on_written);
+        written.map_err(unwritten)
+    }
+}
+
+/// Artifacts that are not written yet.
+#[derive(Default)]
+struct WaitingArtifacts {
+    files: Vec<NewArtifact>,
+    bytes: u64,
+}
+
+impl WaitingArtifacts {
+    /// Returns whether these are as many as should be written together: a disk makes many files durable in little more time
+    /// than one. The limit in bytes bounds the memory.
+    const fn are_enough(&self) -> bool {
+        self.files.len() >= 64 || self.bytes >= 8 << 20
     }
 }
 
