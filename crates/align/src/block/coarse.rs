@@ -308,15 +308,23 @@ impl PageTarget {
         // Ink below this mean square is noise.
         let floor = 1e-3 / 255.0 * face.area;
         let (mut best, mut best_at) = (f32::NEG_INFINITY, 0);
+        let mut scores = [0.0_f32; SIZE];
         for (y, row) in square.chunks_exact(SIZE).enumerate() {
-            for (x, both) in row.iter().enumerate() {
-                if overlaps[0][x] * overlaps[1][y] < min_overlap {
-                    continue;
-                }
+            // The overlap rises and falls along a row, so the places with enough of it follow each other.
+            let is_enough = |overlap: &f32| overlap * overlaps[1][y] >= min_overlap;
+            let Some(first) = overlaps[0].iter().position(is_enough) else {
+                continue;
+            };
+            let row = &row[first..];
+            let count = overlaps[0][first..].iter().take_while(|o| is_enough(o));
+            let scores = &mut scores[..count.count()];
+            for (score, both) in scores.iter_mut().zip(row) {
                 let energy = (both.im * scale).max(floor) * face.energy;
-                let score = both.re * scale / energy.sqrt();
-                if score > best {
-                    (best, best_at) = (score, y * SIZE + x);
+                *score = both.re * scale / energy.sqrt();
+            }
+            for (x, score) in scores.iter().enumerate() {
+                if *score > best {
+                    (best, best_at) = (*score, y * SIZE + first + x);
                 }
             }
         }

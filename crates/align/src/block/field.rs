@@ -107,7 +107,8 @@ impl ShiftField {
 
     /// Returns the shift at a point, mm.
     pub(super) fn at(&self, point: [f64; 2]) -> [f64; 2] {
-        let mut normal = Matrix6::zeros();
+        // Sums over the products of the basis 1, u and v, for each part of the certainty.
+        let (mut by_xx, mut by_yy, mut by_xy) = ([0.0; 6], [0.0; 6], [0.0; 6]);
         let mut right = Vector6::zeros();
         let mut total = 0.0;
         for sample in &self.samples {
@@ -121,23 +122,32 @@ impl ShiftField {
             let weight = sample.weight * near;
             total += weight;
             let [xx, yy, xy] = sample.certainty.map(|c| c * weight);
-            let basis = [1.0, offset[0], offset[1]];
+            let [u, v] = offset;
+            let products = [1.0, u, v, u * u, u * v, v * v];
+            for (k, product) in products.into_iter().enumerate() {
+                by_xx[k] += xx * product;
+                by_yy[k] += yy * product;
+                by_xy[k] += xy * product;
+            }
             let pull = [
                 xx * sample.shift[0] + xy * sample.shift[1],
                 xy * sample.shift[0] + yy * sample.shift[1],
             ];
-            for i in 0..3 {
-                for j in 0..3 {
-                    let product = basis[i] * basis[j];
-                    normal[(i, j)] += xx * product;
-                    normal[(i + 3, j + 3)] += yy * product;
-                    normal[(i, j + 3)] += xy * product;
-                    normal[(i + 3, j)] += xy * product;
-                }
-                right[i] += basis[i] * pull[0];
-                right[i + 3] += basis[i] * pull[1];
+            for (i, basis) in [1.0, u, v].into_iter().enumerate() {
+                right[i] += basis * pull[0];
+                right[i + 3] += basis * pull[1];
             }
         }
+        // Which product belongs to two elements of the basis.
+        let product = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+        let mut normal = Matrix6::from_fn(|i, j| {
+            let sums = match (i / 3, j / 3) {
+                (0, 0) => &by_xx,
+                (1, 1) => &by_yy,
+                _ => &by_xy,
+            };
+            sums[product[i % 3][j % 3]]
+        });
         for k in [0, 3] {
             normal[(k, k)] += PRIOR;
             normal[(k + 1, k + 1)] += RIDGE * total + PRIOR;

@@ -48,10 +48,35 @@ impl SquareFft {
 fn transform(fft: &dyn Fft<f32>, square: &mut [Complex32]) {
     let mut scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
     fft.process_with_scratch(square, &mut scratch);
-    for y in 0..SIZE {
-        for x in 0..y {
-            square.swap(y * SIZE + x, x * SIZE + y);
+    transpose(square);
+    fft.process_with_scratch(square, &mut scratch);
+}
+
+/// Swaps rows and columns of a square, tile by tile, so that both sides of a swap stay in the cache.
+fn transpose(square: &mut [Complex32]) {
+    const TILE: usize = 16;
+    for top in (0..SIZE).step_by(TILE) {
+        for left in (0..=top).step_by(TILE) {
+            for y in top..top + TILE {
+                for x in left..y.min(left + TILE) {
+                    square.swap(y * SIZE + x, x * SIZE + y);
+                }
+            }
         }
     }
-    fft.process_with_scratch(square, &mut scratch);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Complex32, SIZE, transpose};
+
+    #[test]
+    fn every_pixel_is_swapped_once() {
+        let at = |x: usize, y: usize| Complex32::new(x as f32, y as f32);
+        let places = || (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
+        let mut square: Vec<Complex32> = places().map(|(x, y)| at(x, y)).collect();
+        transpose(&mut square);
+        let expected: Vec<Complex32> = places().map(|(x, y)| at(y, x)).collect();
+        assert_eq!(square, expected);
+    }
 }
