@@ -1,7 +1,7 @@
 //! Artifacts: files that are named by the hash of their content. A file with such a name is complete.
 //!
-//! A file is written under a temporary name, synced, and renamed, and then its folder is synced. Only after that may a
-//! row of the catalog name the file.
+//! A file is written under a temporary name, synced, and renamed, and then its folder is synced (`artifact_writer.rs`).
+//! Only after that may a row of the catalog name the file.
 
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
