@@ -26,8 +26,10 @@ impl World {
     pub(super) fn import(pairs: usize) -> anyhow::Result<(Self, ProcessUsage)> {
         let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
         let path = dir.path();
-        std::fs::write(path.join("mesh.stl"), "a mesh that nobody reads")?;
-        std::fs::write(path.join("print.png"), "a print that nobody reads")?;
+        // Longer than pointers of Git LFS, which an import opens.
+        for (name, content) in [("mesh.stl", "a mesh"), ("print.png", "a print")] {
+            std::fs::write(path.join(name), content.repeat(500))?;
+        }
         let list = path.join("pairs.csv");
         write_list(&list, pairs)?;
         let needed = process::mocban(&[
