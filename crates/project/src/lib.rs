@@ -84,6 +84,7 @@ pub mod new_project;
 pub mod own_files;
 pub mod pair_choices;
 pub mod pair_table;
+pub mod renamed_columns;
 mod repeated_files;
 pub mod report;
 pub mod restore;

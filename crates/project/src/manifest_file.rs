@@ -1,6 +1,6 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,9 @@ use super::unread_files::{UnreadFiles, UnreadRows};
 use super::unusable_files::FileSearches;
 use crate::error::ProjectResult;
 use crate::pair_choices::{PairChoices, RowsHash};
+use crate::renamed_columns::renamed_columns;
 use mocban_core::domain::spelling::quoted;
-use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names, sanitize};
+use mocban_core::domain::{ContentHash, FileKind, LengthUnit, PairName, first_names};
 use mocban_lists::manifest::{
     ChangedIds, ChosenColumns, DecimalIds, ListedFolder, ManifestError, ManifestRow,
     MisspeltColumns, PairingChanges, ReadRows, RowIds, pair_folders, read_csv_as, read_jsonl,
@@ -28,9 +29,6 @@ pub const IGNORED: [&str; 3] = [
     "ignored, print without mesh",
     "ignored, neither mesh nor print",
 ];
-
-/// Beginning of the sentence about columns that were read under other names.
-pub const RENAMED: &str = "columns with other names were read";
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]
@@ -318,20 +316,6 @@ fn below(paths: &[PathBuf], root: &Path) -> Vec<String> {
         .filter_map(|path| path.to_str().map(str::to_owned))
         .collect()
 }
-
-/// Says which columns were read under other names. They are given as written, each with its name.
-pub fn renamed_columns(renamed: &BTreeMap<String, &'static str>) -> Option<String> {
-    let columns = renamed.iter();
-    let columns = columns.map(|(written, name)| {
-        let written = quoted(&sanitize(written, MAX_NAME_CHARS));
-        format!("{written} as {name}")
-    });
-    let columns: Vec<String> = columns.collect();
-    (!columns.is_empty()).then(|| format!("{RENAMED}: {}", columns.join(", ")))
-}
-
-/// Longest name of a column in a message, in characters.
-const MAX_NAME_CHARS: usize = 60;
 
 /// Returns a reason with the first paths: `ignored, mesh without print: a.stl, b.stl and 3 more`.
 fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {

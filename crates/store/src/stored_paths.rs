@@ -101,7 +101,7 @@ impl<'p> StoredPaths<'p> {
         Ok((absolute, below))
     }
 
-    /// Returns an absolute path relative to the project: as it is written, or else after links are resolved.
+    /// Returns an absolute path relative to the project. Links are resolved if its text is not below the project.
     fn below_project(&mut self, absolute: &Path) -> Option<PathBuf> {
         if let Ok(below) = absolute.strip_prefix(&self.dir) {
             return Some(below.to_owned());

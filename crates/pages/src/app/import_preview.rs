@@ -17,7 +17,8 @@ use mocban_core::domain::{LengthUnit, one_line};
 use mocban_lists::columns::plain_name;
 use mocban_lists::manifest::{BlockRow, PairingChanges};
 use mocban_project::import_plan::{ImportPlan, PlannedPair};
-use mocban_project::manifest_file::{IGNORED, RENAMED, renamed_columns};
+use mocban_project::manifest_file::IGNORED;
+use mocban_project::renamed_columns::{RENAMED, renamed_columns};
 
 /// Number of warnings and missing files that are shown.
 const SHOWN_LINES: usize = 12;

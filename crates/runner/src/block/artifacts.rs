@@ -18,7 +18,7 @@ pub(crate) struct StageArtifacts<'a> {
     block: &'a BlockName,
     stage: BlockStage,
     written: Mutex<ArtifactSet>,
-    /// Artifacts for the pack of an object store, or those that a folder gets next.
+    /// Artifacts that are not written yet; for an object store, all of its pack.
     waiting: Mutex<WaitingArtifacts>,
     /// When the first file was written.
     began: OnceLock<Instant>,
@@ -88,7 +88,7 @@ impl<'a> StageArtifacts<'a> {
     }
 }
 
-/// Artifacts that are not written yet.
+/// Artifacts that are written together.
 #[derive(Default)]
 struct WaitingArtifacts {
     files: Vec<NewArtifact>,

@@ -5,7 +5,7 @@ use super::fragments::{FRAGMENTS, SENTENCES};
 use super::vietnamese;
 
 /// Sources whose sentences reach pages of imports, blocks and reviews, below `crates`.
-const SOURCES: [&str; 27] = [
+const SOURCES: [&str; 28] = [
     "lists/src/columns.rs",
     "lists/src/labels",
     "lists/src/manifest",
@@ -32,6 +32,7 @@ const SOURCES: [&str; 27] = [
     "project/src/import_blocks.rs",
     "project/src/manifest_file.rs",
     "project/src/missing_files.rs",
+    "project/src/renamed_columns.rs",
     "store/src/lock.rs",
 ];
 
