@@ -77,13 +77,13 @@ impl<'a> BorderStrokes<'a> {
         };
         let moving_border = self.strokes[1].border.to_weights();
         let mut sums = [[0.0_f64; 2]; 2];
-        for (x, y, cell) in placed.common_pixels(&fixed.weight) {
+        placed.each_common_pixel(&fixed.weight, |x, y, cell| {
             let is_border = self.strokes[0].border.at(x, y) || cell.value(&moving_border) > 0.5;
             let (ink, relief) = (fixed.amount.at(x, y), cell.value(&moving.amount));
             let [met, all] = &mut sums[usize::from(is_border)];
             *met += f64::from(ink.min(relief));
             *all += f64::from(ink.max(relief));
-        }
+        });
         let [own, around] = sums.map(|[met, all]| met / all.max(1e-9));
         around >= MIN_RELATIVE_OVERLAP * own
     }

@@ -4,6 +4,7 @@ use super::PyramidLevel;
 use super::pyramid::BilinearCell;
 use mocban_core::domain::Affine2;
 use mocban_core::raster::Grid;
+use mocban_core::simd::dispatch;
 
 /// A moving level at a pose, with its valid mask. `moving_from_fixed` maps between working pixels.
 pub(super) struct PlacedLevel<'a> {
@@ -14,23 +15,30 @@ pub(super) struct PlacedLevel<'a> {
 
 impl PlacedLevel<'_> {
     /// Returns where a pixel of the fixed level lies in the moving level, or `None` if that place is not valid.
-    #[inline]
+    #[inline(always)]
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
         let size = [self.valid.width(), self.valid.height()];
         BilinearCell::at(size, there).filter(|cell| cell.value(self.valid) >= 0.5)
     }
 
-    /// Iterates over the pixels of the fixed level that are valid in both levels. Each item is the pixel's column, its
-    /// row, and its position in the moving level.
-    pub(super) fn common_pixels(
+    /// Calls a function for each pixel of the fixed level that is valid in both levels, with the pixel's column, its row,
+    /// and its position in the moving level.
+    #[inline(always)]
+    pub(super) fn each_common_pixel(
         &self,
         fixed_valid: &Grid<f32>,
-    ) -> impl Iterator<Item = (usize, usize, BilinearCell)> {
-        let rows = 0..fixed_valid.height();
-        rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)))
-            .filter(|(x, y)| fixed_valid.at(*x, *y) != 0.0)
-            .filter_map(|(x, y)| Some((x, y, self.cell(x, y)?)))
+        mut visit: impl FnMut(usize, usize, BilinearCell),
+    ) {
+        for y in 0..fixed_valid.height() {
+            for (x, valid) in fixed_valid.row(y).iter().enumerate() {
+                if *valid != 0.0
+                    && let Some(cell) = self.cell(x, y)
+                {
+                    visit(x, y, cell);
+                }
+            }
+        }
     }
 }
 
@@ -51,16 +59,18 @@ impl PoseOverlap {
         fixed_valid: &Grid<f32>,
         placed: &PlacedLevel<'_>,
     ) -> Self {
-        // A `for` loop would ask the outer of the nested iterators in each step.
-        let common = placed.common_pixels(fixed_valid);
-        let [both, ink, relief] = common.fold([0.0; 3], |[both, ink, relief], (x, y, cell)| {
-            let (a, b) = (fixed.amount.at(x, y), cell.value(&placed.moving.amount));
-            [
-                both + f64::from(a.min(b)),
-                ink + f64::from(a),
-                relief + f64::from(b),
-            ]
-        });
+        let (mut both, mut ink, mut relief) = (0.0, 0.0, 0.0);
+        let relief_amount = &placed.moving.amount;
+        dispatch!(placed.each_common_pixel(
+            fixed_valid,
+            #[inline(always)]
+            |x, y, cell| {
+                let (a, b) = (fixed.amount.at(x, y), cell.value(relief_amount));
+                both += f64::from(a.min(b));
+                ink += f64::from(a);
+                relief += f64::from(b);
+            },
+        ));
         let share = |of: f64| if of > 0.0 { both / of } else { 0.0 };
         Self {
             moving_covered: share(relief),

@@ -278,7 +278,7 @@ pub(super) struct BilinearCell {
 
 impl BilinearCell {
     /// Locates a position; `None` outside the grid.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at([width, height]: [usize; 2], [x, y]: [f64; 2]) -> Option<Self> {
         // Also rejects NaN. Casts truncate; `floor` would be a call.
         if !(x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64) {

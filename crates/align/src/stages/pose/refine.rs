@@ -24,26 +24,56 @@ pub(crate) struct Refiner<'a> {
     fixed: &'a PyramidLevel,
     moving: &'a PyramidLevel,
     samples: Rc<FixedSamples>,
-    /// Value, gradient in x and y, and weight of each pixel of the moving level.
-    cells: Vec<[f32; 4]>,
+    cells: Rc<MovingCells>,
     size: [usize; 2],
     centre: [f64; 2],
     radius: f64,
     energies: [f64; 2],
-    /// Valid masks of the fixed and the moving level, computed when first used.
-    valid_masks: [OnceCell<Grid<f32>>; 2],
+    /// Valid mask of the fixed level, computed when first used.
+    fixed_valid: OnceCell<Grid<f32>>,
+}
+
+/// What a moving level needs to be sampled.
+struct MovingCells {
+    /// Value, gradient in x and y, and weight of each pixel.
+    cells: Vec<[f32; 4]>,
+    energy: f64,
+    /// Valid mask, computed when first used.
+    valid: OnceCell<Grid<f32>>,
+}
+
+impl MovingCells {
+    fn new(level: &PyramidLevel) -> Rc<Self> {
+        Rc::new(Self {
+            cells: cells(level),
+            energy: level.energy(),
+            valid: OnceCell::new(),
+        })
+    }
 }
 
 impl<'a> Refiner<'a> {
     /// Prepares a pair of levels.
     pub(crate) fn new(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
-        Self::with_samples(Rc::new(FixedSamples::new(fixed)), fixed, moving)
+        let samples = Rc::new(FixedSamples::new(fixed));
+        Self::with_samples(samples, fixed, moving, MovingCells::new(moving))
+    }
+
+    /// Prepares another fixed level for the same moving level.
+    pub(crate) fn on<'b>(&self, fixed: &'b PyramidLevel) -> Refiner<'b>
+    where
+        'a: 'b,
+    {
+        let samples = Rc::new(FixedSamples::new(fixed));
+        Refiner::with_samples(samples, fixed, self.moving, Rc::clone(&self.cells))
     }
 
     /// Prepares several moving levels of the same place and size against one fixed level.
     pub(crate) fn for_levels(fixed: &'a PyramidLevel, moving: &'a [PyramidLevel]) -> Vec<Self> {
         let samples = Rc::new(FixedSamples::new(fixed));
-        let with = |moving| Self::with_samples(Rc::clone(&samples), fixed, moving);
+        let with = |moving| {
+            Self::with_samples(Rc::clone(&samples), fixed, moving, MovingCells::new(moving))
+        };
         moving.iter().map(with).collect()
     }
 
@@ -51,16 +81,17 @@ impl<'a> Refiner<'a> {
         samples: Rc<FixedSamples>,
         fixed: &'a PyramidLevel,
         moving: &'a PyramidLevel,
+        cells: Rc<MovingCells>,
     ) -> Self {
         let centre = fixed.centre();
         Self {
-            cells: cells(moving),
             size: [moving.value.width(), moving.value.height()],
             centre,
             radius: centre[0].max(centre[1]).max(1.0),
-            energies: [samples.energy, moving.energy()],
+            energies: [samples.energy, cells.energy],
             samples,
-            valid_masks: Default::default(),
+            cells,
+            fixed_valid: OnceCell::new(),
             fixed,
             moving,
         }
@@ -179,14 +210,14 @@ impl<'a> Refiner<'a> {
         let image_from_work = self.fixed.work_from_image.inverse()?;
         let [one, two] = poses.map(|pose| self.placed(pose));
         let (one, two) = (one?, two?);
-        for (x, y, at_one) in one.common_pixels(&self.fixed.weight) {
+        one.each_common_pixel(&self.fixed.weight, |x, y, at_one| {
             let Some(at_two) = two.cell(x, y) else {
-                continue;
+                return;
             };
             let amounts = [at_one, at_two].map(|cell| cell.value(&self.moving.amount));
             let differences = amounts.map(|amount| self.fixed.amount.at(x, y) - amount);
             visit(image_from_work.apply([x as f64, y as f64]), differences);
-        }
+        });
         Some(())
     }
 
@@ -196,13 +227,13 @@ impl<'a> Refiner<'a> {
         let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
         Some(PlacedLevel {
             moving: self.moving,
-            valid: self.valid_masks[1].get_or_init(|| valid_mask(self.moving)),
+            valid: self.cells.valid.get_or_init(|| valid_mask(self.moving)),
             moving_from_fixed: into.after(&to_middle),
         })
     }
 
     fn fixed_valid(&self) -> &Grid<f32> {
-        self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
+        self.fixed_valid.get_or_init(|| valid_mask(self.fixed))
     }
 
     /// Inverts a map between image pixels, and converts it to working pixels. Positions in the fixed level are relative
@@ -280,10 +311,8 @@ impl<'a> Refiner<'a> {
     fn sample_cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
         let cell = BilinearCell::at_single(self.size, [u, v])?;
         let (from, [fx, fy]) = (cell.from, cell.fraction);
-        let (above, below) = (
-            &self.cells[from..from + 2],
-            &self.cells[from + self.size[0]..][..2],
-        );
+        let cells = &self.cells.cells;
+        let (above, below) = (&cells[from..from + 2], &cells[from + self.size[0]..][..2]);
         let (top, bottom) = (lerp(above[0], above[1], fx), lerp(below[0], below[1], fx));
         Some(lerp(top, bottom, fy))
     }

@@ -14,16 +14,16 @@ pub(super) fn tiebreak_scores(
     candidates: &[PlacedLevel<'_>; 2],
 ) -> [f64; 2] {
     let mut sums = [TiebreakSums::default(); 2];
-    for (x, y, one) in candidates[0].common_pixels(fixed_valid) {
+    candidates[0].each_common_pixel(fixed_valid, |x, y, one| {
         let Some(two) = candidates[1].cell(x, y) else {
-            continue;
+            return;
         };
         let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
         for ((cell, candidate), sums) in [one, two].iter().zip(candidates).zip(&mut sums) {
             let PyramidLevel { value, amount, .. } = candidate.moving;
             sums.add(ink, [value, amount].map(|of| cell.value(of)));
         }
-    }
+    });
     sums.map(|sums| sums.score())
 }
 

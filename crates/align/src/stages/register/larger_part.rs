@@ -21,6 +21,8 @@ const DIRECTIONS: usize = 12;
 const LARGER: [f64; 3] = [0.52, 0.64, 0.76];
 /// Number of poses that are refined on each side of each line.
 const STARTS: usize = 3;
+/// A pose is refined on a side only if it scores at least this fraction of the best one there.
+const PROMISING: f64 = 0.6;
 /// Number of the best lines whose other side is compared with displaced poses.
 const TRIED: usize = 5;
 /// Steps of a refinement.
@@ -118,10 +120,10 @@ pub(super) fn find(
     let of_whole = refined
         .map(|pose| whole.local_score(&pose))
         .fold(0.0, f64::max);
-    let mut sides = posed_sides(&fixed, &moving, &starts)?;
+    let mut sides = posed_sides(&whole, &fixed, &starts)?;
     sides.sort_by(|a, b| b.score.total_cmp(&a.score));
     let parts = sides.iter().take(TRIED).filter_map(|larger| {
-        let smaller = displaced(&fixed, &moving, larger, longest)?;
+        let smaller = displaced(&whole, &fixed, larger, longest)?;
         let sum = larger.share * larger.score + (1.0 - larger.share) * smaller.score;
         Some((larger, smaller, sum))
     });
@@ -141,7 +143,7 @@ pub(super) fn find(
         ..line
     };
     let kept = fixed.restricted(|point| side.contains(point))?;
-    let pose = Refiner::new(&kept, &moving).refine(&larger.pose, STEPS, Loss::Tukey);
+    let pose = whole.on(&kept).refine(&larger.pose, STEPS, Loss::Tukey);
     let masks = side.masks(print);
     let share = masks.ink.count() as f64 / print.ink.count().max(1) as f64;
     let is_cut = masks.known.count() < print.known.count();
@@ -155,8 +157,8 @@ pub(super) fn find(
 
 /// Returns the larger sides of several lines, each with the best pose that is refined on it.
 fn posed_sides(
+    whole: &Refiner,
     fixed: &PyramidLevel,
-    moving: &PyramidLevel,
     starts: &[PoseCandidate],
 ) -> Option<Vec<PosedSide>> {
     let mut ink = Vec::new();
@@ -180,8 +182,13 @@ fn posed_sides(
                 offset: offset.0,
             };
             let part = fixed.restricted(|point| side.contains(point))?;
-            let refiner = Refiner::new(&part, moving);
-            let posed = starts.iter().map(|start| {
+            let refiner = whole.on(&part);
+            let scores = starts.iter().map(|start| refiner.evaluate(start).score);
+            let scores: Vec<f64> = scores.collect();
+            let least = PROMISING * scores.iter().copied().fold(0.0, f64::max);
+            let promising = starts.iter().zip(&scores);
+            let promising = promising.filter(|(_, score)| **score >= least);
+            let posed = promising.map(|(start, _)| {
                 let pose = refiner.refine(start, STEPS, Loss::Huber);
                 let score = refiner.local_score(&pose);
                 PosedSide {
@@ -199,8 +206,8 @@ fn posed_sides(
 
 /// Finds the pose of the smaller part, displaced from that of the larger one. Returns `None` if it fits no better displaced.
 fn displaced(
+    whole: &Refiner,
     fixed: &PyramidLevel,
-    moving: &PyramidLevel,
     larger: &PosedSide,
     longest: f64,
 ) -> Option<PosedSide> {
@@ -208,7 +215,7 @@ fn displaced(
         return None;
     }
     let part = fixed.restricted(|point| !larger.side.contains(point))?;
-    let refiner = Refiner::new(&part, moving);
+    let refiner = whole.on(&part);
     let shifted = |[x, y]: [f64; 2]| PoseCandidate {
         fixed_from_moving: Affine2::scale_shift(1.0, [x, y]).after(&larger.pose.fixed_from_moving),
         ..larger.pose
