@@ -30,6 +30,12 @@ pub fn min_f32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+/// Like [`min_f32`], in double precision.
+#[inline(always)]
+pub fn min_f64(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
 /// Like [`min_f32`], for the larger number.
 #[inline(always)]
 pub fn max_f32(a: f32, b: f32) -> f32 {

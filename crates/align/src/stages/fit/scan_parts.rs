@@ -108,7 +108,7 @@ fn pieces(mesh: &Mesh) -> Vec<Mesh> {
     pieces.sort_by(|a, b| b.1.total_cmp(&a.1));
     let part = |(piece, _): (u32, f64)| {
         let faces = polled(&mesh.triangles).filter(|face| piece_of(face) == piece);
-        of_faces(mesh, &faces.copied().collect::<Vec<_>>())
+        of_faces(mesh, faces)
     };
     pieces.into_iter().map(part).collect()
 }

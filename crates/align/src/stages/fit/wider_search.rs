@@ -17,7 +17,7 @@ use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
 use super::scan_parts::{CandidatePart, parts, some_points, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
-use crate::stages::scan::part_of;
+use crate::stages::scan::{lowest_along, part_in, part_of};
 use crate::stages::zbuffer::IndexedSurface;
 use mocban_core::domain::cancel::{poll, polled};
 use mocban_core::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
@@ -162,7 +162,7 @@ impl WiderSearch<'_> {
         let rivals = self.found.iter();
         let rivals = rivals.filter(|other| other.normal().angle(&here) > RIVAL);
         let rival = rivals.map(|other| other.agreement).fold(0.0, f64::max);
-        let part = without_spikes(&part_of(self.mesh, |corner| side.region.contains(corner)));
+        let part = without_spikes(&part_in(self.mesh, &side.region));
         let indexed = IndexedSurface::new(&part);
         let curved = self.params.curved_blocks;
         let fine = fit_view(&indexed, &side.plane_from_mesh, curved, FINE)?;
@@ -422,11 +422,7 @@ pub(super) fn region(
     let [low, high] = indexed.bounds(&box_from_mesh);
     let slack = SLACK * side.extent;
     // A table that was cut off lies below the lowest corner.
-    let heights = mesh
-        .vertices
-        .iter()
-        .map(|vertex| box_from_mesh.apply(vertex)[2]);
-    let lowest = heights.fold(f64::INFINITY, f64::min) - slack;
+    let lowest = lowest_along(&mesh.vertices, box_from_mesh.0[2]) - slack;
     let down = lowest.max(-DEEPEST * side.relief - side.curvature_height);
     ScanRegion {
         box_from_mesh,
