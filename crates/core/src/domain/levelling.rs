@@ -79,7 +79,14 @@ impl Levelling {
 
     /// Returns the height at a pixel of a depth map of this width and height, in mesh units.
     pub fn height_at(&self, px: [f64; 2], size: [usize; 2]) -> f64 {
-        let weights = Self::weights::<NODES>(px, size);
+        self.height_between([0, 1].map(|axis| Self::cell::<NODES>(px[axis], size[axis])))
+    }
+
+    /// Returns the height between four nodes, in mesh units. `cells` are the column and the row of the first of them, each with
+    /// the offset from it, see [`Self::cell`].
+    #[inline]
+    pub fn height_between(&self, cells: [(usize, f64); 2]) -> f64 {
+        let weights = weights_between(cells);
         weights
             .iter()
             .map(|([x, y], weight)| weight * self.heights[*y][*x])
@@ -88,20 +95,28 @@ impl Levelling {
 
     /// Returns the column and row of the four nodes around a pixel, and the weight of each, for a grid of `N` x `N` nodes.
     pub fn weights<const N: usize>(px: [f64; 2], size: [usize; 2]) -> [([usize; 2], f64); 4] {
-        let along = |axis: usize| {
-            let last = (size[axis].max(2) - 1) as f64;
-            let at = (px[axis] / last * (N - 1) as f64).clamp(0.0, (N - 1) as f64);
-            let first = (at as usize).min(N - 2);
-            (first, at - first as f64)
-        };
-        let ((x, u), (y, v)) = (along(0), along(1));
-        [
-            ([x, y], (1.0 - u) * (1.0 - v)),
-            ([x + 1, y], u * (1.0 - v)),
-            ([x, y + 1], (1.0 - u) * v),
-            ([x + 1, y + 1], u * v),
-        ]
+        weights_between([0, 1].map(|axis| Self::cell::<N>(px[axis], size[axis])))
     }
+
+    /// Returns the last of `N` nodes before a place along a side of a depth map, and the offset of the place from it in distances
+    /// between nodes, 0..=1. `px` and `side` are in pixels.
+    pub fn cell<const N: usize>(px: f64, side: usize) -> (usize, f64) {
+        let last = (side.max(2) - 1) as f64;
+        let at = (px / last * (N - 1) as f64).clamp(0.0, (N - 1) as f64);
+        let first = (at as usize).min(N - 2);
+        (first, at - first as f64)
+    }
+}
+
+/// Returns the column and row of four nodes, and the weight of each.
+#[inline]
+fn weights_between([(x, u), (y, v)]: [(usize, f64); 2]) -> [([usize; 2], f64); 4] {
+    [
+        ([x, y], (1.0 - u) * (1.0 - v)),
+        ([x + 1, y], u * (1.0 - v)),
+        ([x, y + 1], (1.0 - u) * v),
+        ([x + 1, y + 1], u * v),
+    ]
 }
 
 #[cfg(test)]

@@ -46,16 +46,24 @@ impl DepthMap {
     /// get its first or last level.
     #[must_use]
     pub fn levelled(&self, levelling: &Levelling) -> Self {
-        let size = [self.levels.width(), self.levels.height()];
-        let levels = Grid::from_fn(size[0], size[1], |x, y| {
-            let level = self.levels.at(x, y);
-            if level == 0 {
-                return 0;
+        let [width, height] = [self.levels.width(), self.levels.height()];
+        let cells = |side: usize| -> Vec<(usize, f64)> {
+            let places =
+                (0..side).map(|at| Levelling::cell::<{ Levelling::NODES }>(at as f64, side));
+            places.collect()
+        };
+        let (columns, rows) = (cells(width), cells(height));
+        let mut levels = self.levels.clone();
+        for (levels, row) in levels.data_mut().chunks_exact_mut(width.max(1)).zip(rows) {
+            poll();
+            for (level, column) in levels.iter_mut().zip(&columns) {
+                if *level > 0 {
+                    let height = levelling.height_between([*column, row]);
+                    let moved = f64::from(*level) - height / self.scale.height_per_level;
+                    *level = nearest_level(moved);
+                }
             }
-            let height = levelling.height_at([x as f64, y as f64], size);
-            let moved = f64::from(level) - height / self.scale.height_per_level;
-            moved.round().clamp(1.0, 65_535.0) as u16
-        });
+        }
         Self {
             levels,
             scale: self.scale.clone(),
@@ -73,6 +81,15 @@ impl DepthMap {
         let levels: Vec<u16> = levels.iter().map(|level| (*level).max(1)).collect();
         warp_level_sets(&self.levels, &levels, to_from, width, height)
     }
+}
+
+/// Returns the nearest level with data, the higher one of two. A level is not negative, so a cast rounds down; `f64::round`
+/// would be a function call.
+#[inline(always)]
+pub(super) fn nearest_level(level: f64) -> u16 {
+    let level = level.clamp(1.0, 65_535.0);
+    let below = level as u16;
+    below + u16::from(level - f64::from(below) >= 0.5)
 }
 
 #[cfg(any(test, feature = "test-helpers"))]

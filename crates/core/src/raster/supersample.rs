@@ -83,6 +83,7 @@ impl Supersampler {
 
     /// Returns the mean of `value` over the samples of an output pixel, ignoring samples without a value. Returns
     /// `None` if half of the samples or more have no value.
+    #[inline(always)]
     pub(super) fn mean(
         &self,
         x: usize,
@@ -90,23 +91,34 @@ impl Supersampler {
         value: impl Fn([f64; 2]) -> Option<f64>,
     ) -> Option<f64> {
         let (mut sum, mut found) = (0.0, 0_usize);
-        self.for_each_sample(x, y, |place| {
-            if let Some(v) = value(place) {
-                sum += v;
-                found += 1;
-            }
-        });
+        self.for_each_sample(
+            x,
+            y,
+            #[inline(always)]
+            |place| {
+                if let Some(v) = value(place) {
+                    sum += v;
+                    found += 1;
+                }
+            },
+        );
         let count = self.sample_count();
         (2 * found > count || (count == 1 && found == 1)).then(|| sum / found as f64)
     }
 
     /// Returns the mean level of an output pixel. All source pixels around its samples must exist and have data.
+    #[inline(always)]
     pub(super) fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
-        self.for_each_sample(x, y, |place| {
-            let (near, within) = bilinear_cell_inside(levels, place);
-            sum += interpolate(near.map(f64::from), within);
-        });
+        self.for_each_sample(
+            x,
+            y,
+            #[inline(always)]
+            |place| {
+                let (near, within) = bilinear_cell_inside(levels, place);
+                sum += interpolate(near.map(f64::from), within);
+            },
+        );
         sum / self.sample_count() as f64
     }
 

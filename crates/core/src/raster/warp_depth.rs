@@ -1,10 +1,12 @@
 //! Warps a depth map into another frame.
 
+use super::depth_map::nearest_level;
 use super::minmax_pyramid::MinMaxPyramid;
 use super::supersample::{Supersampler, bilinear_cell, interpolate};
 use super::{DepthMap, Grid};
 use crate::domain::Affine2;
 use crate::domain::cancel::poll;
+use crate::simd::dispatch;
 
 /// Side in pixels of the square blocks of output pixels that are tested together for missing data.
 const BLOCK_PX: usize = 4;
@@ -19,7 +21,6 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     };
     let levels = &depth.levels;
     let (sampler, value_ranges) = (Supersampler::new(&from_to), MinMaxPyramid::new(levels));
-    let rounded = |level: f64| level.round().clamp(1.0, 65535.0) as u16;
     let mut out = Grid::new(width, height, 0);
     for top in (0..height).step_by(BLOCK_PX) {
         poll();
@@ -30,22 +31,25 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
             if high == 0 {
                 continue;
             }
-            for y in rows {
-                for x in columns.clone() {
-                    let mean = if low > 0 {
-                        Some(sampler.mean_inside(x, y, levels))
-                    } else {
-                        sampler.mean(x, y, |p| level_at(levels, p))
-                    };
-                    out.set(x, y, mean.map_or(0, rounded));
+            dispatch!({
+                for y in rows {
+                    for x in columns.clone() {
+                        let mean = if low > 0 {
+                            Some(sampler.mean_inside(x, y, levels))
+                        } else {
+                            sampler.mean(x, y, |p| level_at(levels, p))
+                        };
+                        out.set(x, y, mean.map_or(0, nearest_level));
+                    }
                 }
-            }
+            });
         }
     }
     out
 }
 
 /// Interpolates the level between the neighbours with data, or returns `None` if their weights sum to less than 0.5.
+#[inline(always)]
 fn level_at(levels: &Grid<u16>, place: [f64; 2]) -> Option<f64> {
     let (near, within) = bilinear_cell(levels, place);
     if near == [0; 4] {
