@@ -24,6 +24,7 @@ mod print_parts;
 mod scan_parts;
 mod side_surface;
 mod surface;
+mod tightest_frame;
 mod trials;
 mod upper_surface;
 mod wider_search;

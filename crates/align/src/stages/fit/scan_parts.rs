@@ -1,7 +1,5 @@
 //! Finds the parts of a scan that may be the block. Debris and a table below the block are left out.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
@@ -93,18 +91,19 @@ fn pieces(mesh: &Mesh) -> Vec<Mesh> {
             roots[other as usize] = least;
         }
     }
-    let mut areas: BTreeMap<u32, f64> = BTreeMap::new();
+    let mut areas = vec![0.0; mesh.vertices.len()];
     let mut piece_of = |face: &[u32; 3]| root(&mut roots, points[face[0] as usize]);
     for face in polled(&mesh.triangles) {
         let [a, b, c] = corners(mesh, face);
-        *areas.entry(piece_of(face)).or_default() += (b - a).cross(&(c - a)).norm();
+        areas[piece_of(face) as usize] += (b - a).cross(&(c - a)).norm();
     }
-    let largest = areas.values().copied().fold(0.0, f64::max);
-    areas.retain(|_, area| *area >= LEAST_PIECE * largest);
-    if !(2..=MOST_PIECES).contains(&areas.len()) {
+    let largest = areas.iter().copied().fold(0.0, f64::max);
+    let large = (0..).zip(areas);
+    let large = large.filter(|(_, area)| *area > 0.0 && *area >= LEAST_PIECE * largest);
+    let mut pieces: Vec<(u32, f64)> = large.take(MOST_PIECES + 1).collect();
+    if !(2..=MOST_PIECES).contains(&pieces.len()) {
         return Vec::new();
     }
-    let mut pieces: Vec<(u32, f64)> = areas.into_iter().collect();
     pieces.sort_by(|a, b| b.1.total_cmp(&a.1));
     let part = |(piece, _): (u32, f64)| {
         let faces = polled(&mesh.triangles).filter(|face| piece_of(face) == piece);

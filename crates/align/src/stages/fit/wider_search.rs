@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use super::carved_side::AGREEMENT;
-use super::directions::{candidates, facets};
+use super::directions::{Facet, candidates, facets};
 use super::height_samples::{DEEPEST, DEEPEST_CARVING};
 use super::near_plane::near_plane;
 use super::params::FitParams;
@@ -17,9 +17,10 @@ use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
 use super::scan_parts::{CandidatePart, parts, some_points, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
+use super::tightest_frame::{ANGLES, bounds, tightest_frame};
 use crate::stages::scan::{lowest_along, part_in, part_of};
 use crate::stages::zbuffer::IndexedSurface;
-use mocban_core::domain::cancel::{poll, polled};
+use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
 use mocban_core::mesh::Mesh;
 
@@ -51,8 +52,6 @@ const LIKE: f64 = 0.2;
 /// A box is wider than its points by this fraction of their extent, so that corners on the boundary stay inside despite
 /// rounding.
 const SLACK: f64 = 1e-4;
-/// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
-const ANGLES: i32 = 30;
 
 /// A carved side that is not the usual side of the whole scan, or that resembles a part of the print.
 #[derive(Debug)]
@@ -94,14 +93,15 @@ pub(super) fn search<'a>(
 ) -> WiderSearch<'a> {
     let search = SideSearch { inks, params };
     let blocks = parts(mesh, indexed);
-    let mut found = Vec::new();
-    for CandidatePart { mesh, beside } in &blocks {
+    let (mut found, mut whole) = (Vec::new(), None);
+    for (k, CandidatePart { mesh, beside }) in blocks.iter().enumerate() {
         if mesh.vertices.is_empty() {
             continue;
         }
         let indexed = IndexedSurface::new(mesh);
         let axes = Axes::of_surface(mesh, &indexed);
-        for normal in candidates(&axes, &facets(mesh)) {
+        let facets = facets(mesh);
+        for normal in candidates(&axes, &facets) {
             let start = frame(normal, axes.centre);
             let mut side = search.candidate(mesh, &indexed, &start);
             if let Some(side) = side.as_mut().filter(|_| !beside.is_empty()) {
@@ -109,15 +109,15 @@ pub(super) fn search<'a>(
             }
             found.extend(side);
         }
-    }
-    let whole = blocks.first().map(|part| &part.mesh);
-    if let Some(whole) = whole {
-        for share in MIDDLE {
-            found.extend(search.middle_of_grid(whole, share));
+        if k == 0 {
+            whole = Some(WholeScan { mesh, axes, facets });
         }
     }
+    if let Some(whole) = &whole {
+        found.extend(search.middles_of_grid(whole));
+    }
     if found.iter().all(|side| side.agreement < LEAST)
-        && let Some(whole) = whole
+        && let Some(whole) = &whole
     {
         found.extend(search.near_planes(whole));
     }
@@ -215,7 +215,7 @@ impl JudgedSide {
         if let Some((_, region)) = turned.min_by_key(|(inside, _)| *inside) {
             self.region = region;
             let slack = SLACK * self.size();
-            let [low, high] = bounds(piece, &region.box_from_mesh);
+            let [low, high] = bounds(piece.vertices.iter(), &region.box_from_mesh);
             for k in 0..2 {
                 self.region.bounds[0][k] = low[k] - slack;
                 self.region.bounds[1][k] = high[k] + slack;
@@ -272,6 +272,13 @@ fn confidence(agreement: f64, rival: f64) -> f64 {
     (odds / 2.0).tanh().max(0.0)
 }
 
+/// The scan without spikes and debris, with what is measured of it once.
+struct WholeScan<'a> {
+    mesh: &'a Mesh,
+    axes: Axes,
+    facets: Vec<Facet>,
+}
+
 /// What all sides are compared with.
 #[derive(Clone, Copy)]
 struct SideSearch<'a> {
@@ -298,11 +305,9 @@ impl SideSearch<'_> {
     }
 
     /// Returns the carved sides among the parts near large planes.
-    fn near_planes(self, mesh: &Mesh) -> Vec<JudgedSide> {
-        let facets = facets(mesh);
-        let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
-        let normals = candidates(&axes, &facets).into_iter();
-        let parts = normals.filter_map(|normal| near_plane(mesh, &facets, normal));
+    fn near_planes(self, WholeScan { mesh, axes, facets }: &WholeScan) -> Vec<JudgedSide> {
+        let normals = candidates(axes, facets).into_iter();
+        let parts = normals.filter_map(|normal| near_plane(mesh, facets, normal));
         parts
             .filter_map(|(part, start)| self.candidate(&part, &IndexedSurface::new(&part), &start))
             .collect()
@@ -324,12 +329,22 @@ impl SideSearch<'_> {
         })
     }
 
-    /// Returns the carved sides of the middle of a flat scan, where the middle character of a grid lies. The middle has
-    /// `share` of the width and of the height.
-    fn middle_of_grid(self, mesh: &Mesh, share: f64) -> Vec<JudgedSide> {
-        let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
-        let plane = tightest_frame(mesh, &axes);
-        let [low, high] = bounds(mesh, &plane);
+    /// Returns the carved sides of the middles of a flat scan, where the middle character of a grid lies.
+    fn middles_of_grid(self, WholeScan { mesh, axes, .. }: &WholeScan) -> Vec<JudgedSide> {
+        let (plane, size) = tightest_frame(mesh, axes);
+        let sides = MIDDLE.map(|share| self.middle_of_grid(mesh, &plane, size, share));
+        sides.into_iter().flatten().collect()
+    }
+
+    /// Returns the carved sides of the part of a scan that has `share` of the width and of the height of a frame. `low` and
+    /// `high` are the bounds of the scan in the frame.
+    fn middle_of_grid(
+        self,
+        mesh: &Mesh,
+        plane: &Rigid3,
+        [low, high]: [[f64; 2]; 2],
+        share: f64,
+    ) -> Vec<JudgedSide> {
         let inside = |at: f64, k: usize| {
             let (middle, side) = (f64::midpoint(low[k], high[k]), high[k] - low[k]);
             (at - middle).abs() < side * share / 2.0
@@ -344,7 +359,7 @@ impl SideSearch<'_> {
         let indexed = IndexedSurface::new(&middle);
         let [x, y, z, last] = plane.0;
         let back = Rigid3([x, y.map(|v| -v), z.map(|v| -v), last]);
-        let sides = [plane, back].into_iter();
+        let sides = [*plane, back].into_iter();
         sides
             .filter_map(|side| self.candidate(&middle, &indexed, &side))
             .collect()
@@ -364,37 +379,6 @@ fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
         side.plane_from_mesh.apply(corner)[2] > deepest
     });
     (near.vertices.len() >= 16).then_some(near)
-}
-
-/// Returns the frame with the least principal axis as z whose x and y axes give the bounding box of the mesh the
-/// smallest area.
-fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
-    let normal = axes.normal();
-    let level = frame(normal, axes.centre);
-    let [x, y] = [0, 1].map(|k| Vector3::new(level.0[k][0], level.0[k][1], level.0[k][2]));
-    let turned = (0..ANGLES).map(|step| {
-        let angle = FRAC_PI_2 * f64::from(step) / f64::from(ANGLES);
-        frame_along(normal, x * angle.cos() + y * angle.sin(), axes.centre)
-    });
-    let area = |frame: &Rigid3| {
-        let [low, high] = bounds(mesh, frame);
-        (high[0] - low[0]) * (high[1] - low[1])
-    };
-    let areas = turned.map(|frame| (area(&frame), frame));
-    let tightest = areas.min_by(|a, b| a.0.total_cmp(&b.0));
-    tightest.map_or(level, |(_, frame)| frame)
-}
-
-/// Returns the lowest and the highest coordinates of the vertices in a frame.
-fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
-    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for at in polled(mesh.vertices.iter()).map(|vertex| frame.apply(vertex)) {
-        for k in 0..3 {
-            bounds[0][k] = bounds[0][k].min(at[k]);
-            bounds[1][k] = bounds[1][k].max(at[k]);
-        }
-    }
-    bounds
 }
 
 /// Returns the height over the plane, in mesh units, above which nothing belongs to the carving.
