@@ -19,6 +19,8 @@ use mocban_core::raster::{DepthMap, Mask, PixelBox};
 
 /// The trials end at a candidate with at least this confidence.
 const SURE: f64 = 0.8;
+/// The usual side ends the search before any other candidate is sought, if it has at least this confidence.
+const CERTAIN: f64 = 0.9;
 /// The second candidate replaces the first one if its confidence exceeds that of the first by this.
 const SURER: f64 = 0.1;
 /// Each further candidate must exceed the best one by this more: the best of many chance matches is high.
@@ -69,6 +71,8 @@ pub(super) struct Trials<'a> {
     /// The best candidate so far, and its confidence.
     best: Option<(FitOutcome, f64)>,
     tried: Vec<FitOutcome>,
+    /// A candidate that was registered before it is added, with its result.
+    known: Option<(FitOutcome, (FitOutcome, f64))>,
 }
 
 /// The pose of a registered candidate.
@@ -89,7 +93,19 @@ impl<'a> Trials<'a> {
             params,
             best: None,
             tried: Vec::new(),
+            known: None,
         }
+    }
+
+    /// Registers a candidate. Returns it if it is so sure that no other one needs to be sought, which takes longer than the
+    /// registration. Otherwise its result is kept until it is added.
+    pub(super) fn certain(&mut self, candidate: FitOutcome) -> Option<FitOutcome> {
+        let (found, confidence) = self.rated(candidate.clone(), false);
+        if confidence >= CERTAIN {
+            return Some(found);
+        }
+        self.known = Some((candidate, (found, confidence)));
+        None
     }
 
     /// Registers a candidate. Keeps it if it is the first one or surer than the best one so far. The box of a piece is not
@@ -100,6 +116,20 @@ impl<'a> Trials<'a> {
             return;
         }
         self.tried.push(candidate.clone());
+        let is_known = |(known, _): &mut (FitOutcome, _)| !is_piece && *known == candidate;
+        let (candidate, confidence) = match self.known.take_if(is_known) {
+            Some((_, rated)) => rated,
+            None => self.rated(candidate, is_piece),
+        };
+        let before = self.tried.len() - 1;
+        let is_better = |(_, best): &(FitOutcome, f64)| replaces(confidence, *best, before);
+        if self.best.as_ref().is_none_or(is_better) {
+            self.best = Some((candidate, confidence));
+        }
+    }
+
+    /// Registers a candidate, and widens its box if it is no piece. Returns the candidate with its confidence.
+    fn rated(&self, candidate: FitOutcome, is_piece: bool) -> (FitOutcome, f64) {
         let (candidate, confidence) = if is_piece {
             let pose = self.registered(&candidate);
             let confidence = pose.map_or(0.0, |pose| pose.confidence * pose.seen_ink);
@@ -109,11 +139,7 @@ impl<'a> Trials<'a> {
         };
         let is_small = self.print.mask_scale().enlargement().is_some();
         let confidence = confidence * factor_of_winding(is_small, candidate.side.winding);
-        let before = self.tried.len() - 1;
-        let is_better = |(_, best): &(FitOutcome, f64)| replaces(confidence, *best, before);
-        if self.best.as_ref().is_none_or(is_better) {
-            self.best = Some((candidate, confidence));
-        }
+        (candidate, confidence)
     }
 
     /// Returns whether the best candidate is so sure that no other one needs to be tried.

@@ -16,6 +16,10 @@ use crate::stages::scan::Scan;
 use mocban_core::domain::{FitOutcome, Rigid3, SideEvidence};
 use mocban_core::mesh::Mesh;
 
+/// A usual side that resembles the print less than a side that is accepted is registered before others are sought, if its
+/// agreement is at least this.
+const LIKELY: f64 = 0.35;
+
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
 ///
 /// `scanned_face_down` is whether the block lay face down in the scan, with the carved face towards -z of the mesh.
@@ -133,7 +137,8 @@ impl Fitting<'_> {
     /// Registers candidates, the likeliest first, until one is sure: the side or part that resembles the print best, both
     /// sides of the whole scan, and the other sides and parts. `usual` is the usual side with its fine fit, if that is
     /// carved, and `agreement` its agreement with the print. If it resembles the print, so that only separate pieces ask
-    /// for trials, it is registered first. Returns `None` if there is no candidate.
+    /// for trials, it is registered first. So is one with some resemblance: most searches for other sides and parts, which take
+    /// ten times as long, find none that is surer. Returns `None` if there is no candidate.
     fn by_trials(
         &self,
         print: &Print,
@@ -153,6 +158,10 @@ impl Fitting<'_> {
             if trials.is_sure() {
                 return trials.into_best(true);
             }
+        } else if agreement >= LIKELY
+            && let Some(certain) = of_usual().and_then(|usual| trials.certain(usual))
+        {
+            return Some(certain);
         }
         let parts = part_search::search(indexed, &self.start, print, params);
         let parts = parts.filter(|found| found.agreement > agreement * BETTER);

@@ -4,7 +4,7 @@ use super::{Trials, factor_of_winding, replaces};
 use crate::stages::fit::fit;
 use crate::stages::testing::settings;
 use crate::stages::{Print, Scan};
-use mocban_core::domain::{FitOutcome, ScanRegion};
+use mocban_core::domain::{FitOutcome, Rigid3, ScanRegion};
 use mocban_core::raster::{ImageLimits, decode};
 use mocban_demo::{DemoPair, PairGenerator, Tier};
 use nalgebra::Vector3;
@@ -43,6 +43,24 @@ fn a_box_that_cuts_through_the_character_is_widened() {
     let region = trials.into_best(true).and_then(|found| found.region);
     let [.., to] = region.expect("a box").bounds;
     assert!(to[0] > low[0] + 0.9 * width, "{to:?} {low:?} {width}");
+}
+
+#[test]
+fn a_sure_side_ends_the_search_before_others_are_sought() {
+    let pair = upright_pair();
+    let (scan, print) = read(&pair);
+    let params = settings().fit;
+    let whole = fit(&scan, Some(&print), None, &params).expect("a plane");
+    let mut trials = Trials::new(&scan, &print, &params);
+    assert_eq!(trials.certain(whole.clone()).as_ref(), Some(&whole));
+    let [x, y, z, last] = whole.plane_from_mesh.0;
+    let back = FitOutcome {
+        plane_from_mesh: Rigid3([x, y.map(|v| -v), z.map(|v| -v), last]),
+        ..whole
+    };
+    assert_eq!(trials.certain(back.clone()), None);
+    trials.add(back, false);
+    assert!(!trials.is_sure() && trials.known.is_none());
 }
 
 #[test]
