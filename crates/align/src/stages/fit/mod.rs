@@ -4,8 +4,8 @@
 //! foot or a table below the carved face are left out; if there are any, the outcome has a region. The plane of a
 //! side depends on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the
 //! side is chosen in this stage. If the chosen side does not resemble the print, or if the scan shows several pieces,
-//! all sides and parts of the scan are tried (`wider_search`), and parts of the print (`part_search`). The likeliest of
-//! them are registered (`trials`), until one is sure. The outcome of `wider_search` always has a region, which is the
+//! the side is registered (`trials`). Unless it is sure, all sides and parts of the scan are sought (`wider_search`), and
+//! parts of the print (`part_search`). The likeliest of them are registered until one is sure. The outcome of `wider_search` always has a region, which is the
 //! part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the part of the
 //! print that shows the character. If a pair was cut from a block and its strokes do not determine a plane, the block's
 //! normal decides (`block_face`). The paper's own fit is in `paper_method::fit`.

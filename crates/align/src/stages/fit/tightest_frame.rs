@@ -60,14 +60,14 @@ fn outermost(mesh: &Mesh, level: &Rigid3) -> Vec<[f64; 3]> {
         [x, y]
     };
     let some: Vec<[f64; 2]> = some_points(mesh).into_iter().map(place).collect();
-    let polygon = Polygon::around(&some);
+    let polygon = InnerPolygon::around(&some);
     polled(mesh.vertices.iter())
         .filter(|vertex| !polygon.contains(place(*vertex)))
         .collect()
 }
 
 /// A convex polygon.
-struct Polygon {
+struct InnerPolygon {
     /// A point and the unit normal, which points inward, of each side.
     sides: Vec<[[f64; 2]; 2]>,
     /// Centre and square of the radius of a circle inside.
@@ -76,7 +76,7 @@ struct Polygon {
     margin: f64,
 }
 
-impl Polygon {
+impl InnerPolygon {
     /// Returns the polygon of the outermost points along some directions.
     fn around(points: &[[f64; 2]]) -> Self {
         let angles = (0..DIRECTIONS)

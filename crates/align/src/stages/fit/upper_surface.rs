@@ -1,7 +1,7 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
 //! carved side is then fitted again at a finer resolution. If this side does not resemble the print, or if the scan shows
-//! several pieces, parts of the print are tried, and all sides of all parts of the scan; the likeliest are registered
-//! (`trials`).
+//! several pieces, it is registered (`trials`); unless it is sure, so are the likeliest parts of the print, and the likeliest
+//! sides of all parts of the scan.
 
 use super::carved_side::{self, CarvedSide, SideInputs};
 use super::params::{FitError, FitParams};
