@@ -9,8 +9,14 @@ use mocban_core::raster::Mask;
 const STROKE: u8 = 128;
 /// Largest fraction of the strokes beyond a frame in pieces.
 const BEYOND_PIECES: f64 = 0.02;
-/// Least part of a rule that the block shows, and distance within which two rules are the same, mm.
+/// Least part of a rule that the block shows. Lines of a stamp over dense text have up to 0.86, but less than
+/// [`MIN_THIN`] of their rows meet a carved stroke that is at most [`THIN_CARVED_MM`] wide; rules have at least 0.4.
 const MIN_CARVED: f64 = 0.75;
+const MIN_THIN: f64 = 0.35;
+const THIN_CARVED_MM: f64 = 1.2;
+/// The same for thick lines of the frame.
+const MOST_CARVED: f64 = 0.9;
+/// Distance within which two rules are the same, mm.
 const SAME_RULE_MM: f64 = 0.6;
 /// Pieces of the frame.
 const FRAME_PIECES: PieceLimits = PieceLimits {
@@ -121,9 +127,9 @@ impl PageRules {
                 distances.any(|distance| distance * PIXEL_MM <= SAME_RULE_MM)
             };
             let rules = std::mem::take(&mut self.found[usize::from(is_across)]);
-            let (known, marks): (Vec<Rule>, Vec<Rule>) = rules.into_iter().partition(|rule| {
-                is_among(rule, &carved) || carved_part(&whole, &erased, rule) >= MIN_CARVED
-            });
+            let (known, marks): (Vec<Rule>, Vec<Rule>) = rules
+                .into_iter()
+                .partition(|rule| is_among(rule, &carved) || is_carved(&whole, &erased, rule));
             carved.retain(|rule| !is_among(rule, &known));
             self.found[usize::from(is_across)] = known;
             self.take(is_across, |text, erased, relief| {
@@ -179,18 +185,32 @@ fn restore(text: &mut Mask, erased: &mut Mask, relief: &Mask, of_rules: &Mask, m
     }
 }
 
-/// Returns the fraction of the erased pixels of a rule along y at which the block shows strokes.
-fn carved_part(relief: &Mask, erased: &Mask, rule: &Rule) -> f64 {
+/// Returns whether the block shows the erased pixels of a line along y as a rule, and not as the text below a mark.
+fn is_carved(relief: &Mask, erased: &Mask, rule: &Rule) -> bool {
+    let width = relief.width();
     let first = rule.edges[0].max(0.0) as usize;
-    let last = (rule.edges[1].max(0.0) as usize).min(relief.width() - 1);
-    let [mut carved, mut all] = [0_usize; 2];
+    let last = (rule.edges[1].max(0.0) as usize).min(width - 1);
+    let widest = (THIN_CARVED_MM / PIXEL_MM) as usize;
+    let [mut all, mut carved, mut rows, mut thin] = [0_usize; 4];
     for y in 0..relief.height() {
+        let row = relief.row(y);
+        let (mut is_erased, mut at_carved) = (false, None);
         for x in (first..=last).filter(|x| erased.at(*x, y)) {
+            is_erased = true;
             all += 1;
-            carved += usize::from(relief.at(x, y));
+            carved += usize::from(row[x]);
+            at_carved = at_carved.or(row[x].then_some(x));
+        }
+        rows += usize::from(is_erased);
+        if let Some(x) = at_carved {
+            let begin = row[..x].iter().rposition(|set| !set).map_or(0, |k| k + 1);
+            let length = row[begin..].iter().take_while(|set| **set).count();
+            thin += usize::from(length <= widest);
         }
     }
-    carved as f64 / all.max(1) as f64
+    let part = carved as f64 / all.max(1) as f64;
+    let is_thin = thin as f64 >= MIN_THIN * rows as f64;
+    part >= MOST_CARVED || (part >= MIN_CARVED && is_thin)
 }
 
 /// Takes the pieces of rules along y that have nearly no strokes on one side.
