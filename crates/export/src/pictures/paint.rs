@@ -69,10 +69,11 @@ fn mean(image: &Rgb, columns: &Span, rows: &Span) -> [u8; 3] {
     for (y, wy) in rows {
         for (x, wx) in columns {
             let colour = image.at(*x, *y);
-            for (total, channel) in sum.iter_mut().zip(colour) {
-                *total += wx * wy * f64::from(channel);
+            let at = wx * wy;
+            for channel in 0..3 {
+                sum[channel] += at * f64::from(colour[channel]);
             }
-            weight += wx * wy;
+            weight += at;
         }
     }
     sum.map(|total| (total / weight).round() as u8)
