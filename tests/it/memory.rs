@@ -22,13 +22,20 @@ pub(crate) fn enlarge(path: &Path, pixels: usize) {
     let bytes = std::fs::read(path).expect("a print");
     let small = decode(&bytes, &ImageLimits::SUGGESTED)
         .expect("a picture")
-        .rgb;
+        .rgb
+        .map(|colour| colour.map(|channel| (channel >> 8) as u8));
     let times = (pixels / (small.width() * small.height())).isqrt();
-    let color = |x: usize, y: usize| {
-        let of_16_bits = small.at(x / times, y / times);
-        of_16_bits.map(|channel| (channel >> 8) as u8)
-    };
-    let large = Grid::from_fn(small.width() * times, small.height() * times, color);
+    let [width, height] = [small.width() * times, small.height() * times];
+    // A whole row at a time, because tests are compiled without optimization.
+    let mut large = Vec::with_capacity(width * height);
+    for y in 0..small.height() {
+        let colours = small.row(y).iter();
+        let row: Vec<[u8; 3]> = colours
+            .flat_map(|colour| std::iter::repeat_n(*colour, times))
+            .collect();
+        (0..times).for_each(|_| large.extend_from_slice(&row));
+    }
+    let large = Grid::from_vec(width, height, large).expect("as many pixels");
     std::fs::write(path, jpeg_rgb8(&large, 90)).expect("written");
 }
 
