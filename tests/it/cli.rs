@@ -59,15 +59,13 @@ pub(crate) fn binary() -> Command {
 }
 
 /// Returns a command that runs the binary through a hard link beside `path`, because another user may not be allowed to
-/// enter the build folder. Runs the binary itself if the link would be on another file system.
+/// enter the build folder. On another file system, runs a copy.
 pub(crate) fn binary_beside(path: &Path) -> Command {
     let link = path.with_file_name("mocban-link");
-    let is_linked = link.exists() || std::fs::hard_link(BINARY, &link).is_ok();
-    without_settings(Command::new(if is_linked {
-        &link
-    } else {
-        Path::new(BINARY)
-    }))
+    if !link.exists() && std::fs::hard_link(BINARY, &link).is_err() {
+        std::fs::copy(BINARY, &link).expect("copied");
+    }
+    without_settings(Command::new(link))
 }
 
 /// Returns a command that runs a script in the shell. The script may call the binary.
