@@ -42,6 +42,8 @@ impl Numbers {
         self.add("inputs.share", &inputs.doubts.share)?;
         self.add("inputs.smooth_misfit", &inputs.doubts.smooth_misfit)?;
         self.add("inputs.seen_ink", &inputs.doubts.seen_ink)?;
+        self.add("inputs.lone_stroke", &inputs.doubts.lone_stroke)?;
+        self.add("inputs.parts_overlap", &inputs.doubts.parts_overlap)?;
         self.add("inputs.pixel_width", &inputs.pixel_width)
     }
 

@@ -75,12 +75,13 @@ impl ConfidenceInputs {
     pub fn confidence(&self) -> f64 {
         let mirrored = self.pose[MIRRORED_INPUT].exp();
         self.of_candidate()
+            * self.doubts.of_similar_characters()
             * of_pixels(self.pixel_width, self.prior)
             * of_upright(mirrored, self.prior)
     }
 
     /// Returns the confidence of a candidate of a fit. It lacks the doubt about the print's pixels, which is the same for
-    /// all candidates, and that about a mirrored pair, which is for the chosen candidate.
+    /// all candidates, and those about a mirrored pair and a similar character, which are for the chosen candidate.
     pub(crate) fn of_candidate(&self) -> f64 {
         pose_probability(&self.pose, self.prior)
             * logistic(&MASK, &self.mask)

@@ -5,12 +5,18 @@ use crate::stages::normalize::PrintMasks;
 use mocban_core::domain::Affine2;
 use mocban_core::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
 
+/// Pixels within this many pixels of the border of the common area are at the border. Walls, stains and neighbouring strokes
+/// lie there.
+pub(super) const BORDER_PX: i64 = 2;
+
 /// Print and depth map in one frame.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
     pub(super) levels: Grid<u16>,
     /// Ink where both hold data.
     pub(super) ink: Mask,
+    /// Ink where the print holds data and the depth map does not.
+    pub(super) beyond: Mask,
     /// Pixels with a speck of ink, see `PrintMasks::specks`.
     pub(super) specks: Mask,
     /// Distances to the edge of the ink.
@@ -39,26 +45,31 @@ impl HalfCanvas {
         let half_from_masks = half_from_print.after(&print.print_from_masks());
         let paper = warp_mask(&print.known, &half_from_masks, side, side);
         let mut ink = warp_mask(&print.ink, &half_from_masks, side, side);
+        let mut beyond = ink.zip_map(&paper, |ink, paper| ink && paper);
         let both = levels.data_mut().iter_mut().zip(ink.data_mut());
-        for ((level, ink), paper) in both.zip(paper.data()) {
+        let both = both.zip(beyond.data_mut());
+        for (((level, ink), beyond), paper) in both.zip(paper.data()) {
+            *beyond &= *level == 0;
             *level *= u16::from(*paper);
             *ink &= *level > 0;
         }
         Self {
+            beyond,
             specks: scattered(&print.specks, &half_from_masks, side),
             print_px: (print.scale.enlargement()).map_or(0.0, |_| half_from_print.scale()),
             ..Self::of(levels, ink)
         }
     }
 
-    /// Creates a canvas of levels and ink, without specks. The ink must be clear where the level is 0.
+    /// Creates a canvas of levels and ink, without specks and without ink beyond the depth map. The ink must be clear where the level is 0.
     pub(super) fn of(levels: Grid<u16>, ink: Mask) -> Self {
         let edge = InkEdge::of(&ink);
-        let specks = Mask::new(ink.width(), ink.height(), false);
+        let [specks, beyond] = [(); 2].map(|()| Mask::new(ink.width(), ink.height(), false));
         Self {
             levels,
             ink,
             specks,
+            beyond,
             stroke_width: stroke_width(&edge),
             print_px: 0.0,
             edge,
@@ -75,6 +86,22 @@ impl HalfCanvas {
     /// Returns the stroke mask of a level above 0.
     pub(super) fn mask(&self, level: u16) -> Mask {
         self.levels.map(|l| *l >= level)
+    }
+
+    /// Returns the intersection over union of the ink and the strokes of the best of several levels.
+    pub(super) fn best_iou(&self, levels: impl IntoIterator<Item = u16>) -> f64 {
+        let iou = |level: u16| {
+            let pairs = self.levels.data().iter().zip(self.ink.data());
+            let (both, any) = pairs.fold((0_u32, 0_u32), |(both, any), (at, ink)| {
+                let is_stroke = *at >= level;
+                (
+                    both + u32::from(is_stroke && *ink),
+                    any + u32::from(is_stroke || *ink),
+                )
+            });
+            f64::from(both) / f64::from(any.max(1))
+        };
+        levels.into_iter().map(iou).fold(0.0, f64::max)
     }
 
     /// Returns the signed distance to `edge`, in pixels, at each boundary between a set and an unset pixel of a mask.
@@ -114,6 +141,19 @@ impl HalfCanvas {
             }
         }
     }
+}
+
+/// Returns whether a pixel is near the unknown ones or the border of the canvas.
+pub(super) fn is_at_border(unknown: &Mask, x: i64, y: i64) -> bool {
+    let around = [
+        (BORDER_PX, 0),
+        (-BORDER_PX, 0),
+        (0, BORDER_PX),
+        (0, -BORDER_PX),
+    ];
+    around
+        .iter()
+        .any(|(dx, dy)| unknown.get(x + dx, y + dy).unwrap_or(true))
 }
 
 /// Returns a map to the canvas as a map to the half canvas.

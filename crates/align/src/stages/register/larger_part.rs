@@ -67,6 +67,12 @@ pub(super) struct OtherPart {
 }
 
 impl OtherPart {
+    /// Returns the masks of the part, and the map from depth-map pixels to print pixels on it.
+    pub(super) fn masks(&self, print: &PrintMasks) -> (PrintMasks, Affine2) {
+        let print_from_depth = print.print_from_masks().after(&self.pose.fixed_from_moving);
+        (self.larger.opposite().masks(print), print_from_depth)
+    }
+
     /// Returns the part in pixels of the print. `rest` maps depth-map pixels to print pixels on the larger part, which has
     /// the given share of the ink.
     pub(super) fn in_print(&self, print: &PrintMasks, rest: &Affine2, share: f64) -> DisplacedPart {

@@ -12,6 +12,7 @@ mod half_canvas;
 mod ink_edge;
 mod larger_part;
 mod levelling;
+mod lone_stroke;
 mod metric_thresholds;
 mod misfit;
 mod observation;
@@ -38,12 +39,13 @@ pub use stroke_map::StrokeMap;
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use crate::stages::pose::SoftMask;
+use half_canvas::HalfCanvas;
 use larger_part::OtherPart;
 use metric_thresholds::ChosenThreshold;
 use mocban_core::domain::{InkHypothesis, PoseFeatures};
 use mocban_core::raster::{DepthMap, Mask};
 use pose_search::PoseSearch;
-use posed::{Levelled, Posed};
+use posed::{Levelled, Posed, TornParts};
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
 pub const REVISION: u32 = 32;
@@ -181,6 +183,10 @@ pub fn register(
         // A levelling chooses the heights from the ink, which hides displaced strokes: the larger misfit counts.
         smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
         seen_ink: seen_ink(print, &posed.canvas.ink),
+        lone_stroke: (of_part.as_ref())
+            .map_or(0.0, |part| part.both.lone_stroke)
+            .max(posed.lone_stroke),
+        parts_overlap: of_part.as_ref().map_or(1.0, |part| part.both.overlap),
     };
     require_belief(features, search.prior, doubts, params)
         .map_err(|error| error.with(|| posed.observe(depth)))?;
@@ -217,6 +223,8 @@ struct TornPrint {
     share: f64,
     /// The smaller part.
     other: OtherPart,
+    /// How well both parts agree with the relief.
+    both: TornParts,
 }
 
 /// Returns the pose on the larger part of a torn print, if that is more probable than `single`, the pose on the whole
@@ -241,14 +249,26 @@ fn on_larger_part(
     let found = pose_search::search_part(depths, print, search, &part, params).ok()?;
     let masks = normalized.with_masks(search.ink, part.masks.clone());
     let posed = Posed::new(depth, depths, &relief, &masks, &found, false, params).ok()?;
-    (part.share * probability(&posed) > of_whole).then_some(PartFit {
-        search: found,
-        posed,
+    if part.share * probability(&posed) <= of_whole {
+        return None;
+    }
+    let (rest, print_from_depth) = part.other.masks(print);
+    let canvas = HalfCanvas::new(
+        depth,
+        &rest,
+        &normalized.outcome.inks[search.ink].canvas_from_print,
+        &print_from_depth,
+        normalized.outcome.canvas_px,
+    );
+    Some(PartFit {
         part: TornPrint {
             masks,
             share: part.share,
             other: part.other,
+            both: posed.with_smaller(&canvas, depth),
         },
+        search: found,
+        posed,
     })
 }
 

@@ -36,6 +36,8 @@ pub(super) struct Posed {
     pub(super) features: PoseFeatures,
     /// Displacement of whole strokes of the ink, see `misfit`, as a fraction of the stroke width.
     pub(super) smooth_misfit: f64,
+    /// How surely one of print and relief has a whole stroke that the other one lacks, 0..=1, see `lone_stroke`.
+    pub(super) lone_stroke: f64,
     /// Heights of the relief.
     relief: ReliefHeights,
     /// Distance by which the ink spreads over the strokes, in pixels of the half canvas.
@@ -71,10 +73,12 @@ impl Posed {
             metric_thresholds::choose(depth, relief, &canvas, is_levelled, params)?;
         let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
         let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
-        let unmatched = Unmatched::of(&canvas, range);
+        let relief_levels = relief.depth() / depth.scale.height_per_level;
+        let unmatched = Unmatched::of(&canvas, range, relief_levels);
         Ok(Self {
             features: with_unmatched(refined.features, &unmatched),
             smooth_misfit: unmatched.smooth_misfit,
+            lone_stroke: unmatched.lone_strokes[0].max(unmatched.lone_strokes[1]),
             refined,
             canvas,
             thresholds,
@@ -83,10 +87,39 @@ impl Posed {
         })
     }
 
+    /// Returns the levels of all metrics.
+    fn levels(&self) -> impl Iterator<Item = u16> {
+        self.thresholds.iter().map(|chosen| chosen.choice.level)
+    }
+
+    /// Compares the two parts of a torn print with the relief, each at its pose. This is the pose of the larger part.
+    /// `canvas` shows the smaller one, with levels of the depth map `depth`.
+    pub(super) fn with_smaller(&self, canvas: &HalfCanvas, depth: &DepthMap) -> TornParts {
+        let levels: Vec<u16> = self.levels().collect();
+        let range = [levels.iter().max(), levels.iter().min()].map(|level| *level.unwrap_or(&1));
+        let relief_levels = self.relief.depth() / depth.scale.height_per_level;
+        // Wood near the line without ink was printed on the larger part, or is hidden.
+        let unmatched = Unmatched::of(canvas, range, relief_levels);
+        let overlaps = [&self.canvas, canvas].map(|part| part.best_iou(levels.iter().copied()));
+        TornParts {
+            overlap: overlaps[0] * overlaps[1],
+            lone_stroke: unmatched.lone_strokes[0],
+        }
+    }
+
     /// Returns what is unusual about the pair, if it does not match. `depth` is the map that this pose places.
     pub(super) fn observe(&self, depth: &DepthMap) -> Observation {
         observe(depth, &self.relief, &self.canvas)
     }
+}
+
+/// How well the two parts of a torn print agree with the relief, each at its pose.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TornParts {
+    /// Product of the parts' intersections over union of ink and strokes, 0..=1.
+    pub(super) overlap: f64,
+    /// How surely the smaller part has a whole stroke that was not carved, 0..=1.
+    pub(super) lone_stroke: f64,
 }
 
 /// A depth map that the ink shows to need a levelling.

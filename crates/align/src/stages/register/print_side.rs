@@ -22,6 +22,14 @@ impl Side {
         self.beyond(point) < 0.0
     }
 
+    /// Returns the other side of the line.
+    pub(super) fn opposite(&self) -> Self {
+        Self {
+            normal: self.normal.map(|part| -part),
+            offset: -self.offset,
+        }
+    }
+
     /// Returns how far a point lies beyond the line, pixels.
     fn beyond(&self, [x, y]: [f64; 2]) -> f64 {
         self.normal[0] * x + self.normal[1] * y - self.offset

@@ -1,8 +1,8 @@
 //! Maps where the mask of a threshold and the ink disagree by more than the spread of the ink explains.
 
-use super::half_canvas::HalfCanvas;
+use super::half_canvas::{BORDER_PX, HalfCanvas};
 use super::ink_edge::{InkEdge, REACH};
-use super::unmatched::{BORDER_PX, tolerance_px};
+use super::unmatched::tolerance_px;
 use crate::stages::normalize::PrintMasks;
 use mocban_core::domain::{Affine2, Disagreement};
 use mocban_core::raster::components::ConnectedComponents;

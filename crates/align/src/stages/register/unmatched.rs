@@ -3,8 +3,9 @@
 //! Missing ink or missing wood alone is common: ink is dry, and wood breaks off. A print of a similar character differs
 //! in both ways: it has a stroke that the relief lacks, and lacks one that the relief has.
 
-use super::half_canvas::HalfCanvas;
+use super::half_canvas::{BORDER_PX, HalfCanvas};
 use super::ink_edge::{InkEdge, REACH};
+use super::lone_stroke::{Alone, lone_strokes};
 use super::misfit::smooth_misfit;
 use mocban_core::raster::Mask;
 use mocban_core::raster::components::ConnectedComponents;
@@ -21,9 +22,6 @@ const TOLERANCE_PRINT_PX: f64 = 0.4;
 const PIXEL_SCATTER: f64 = 0.15;
 /// Edges that deviate by at least this fraction of the stroke width do not count for the scatter.
 const NEAR: f64 = 0.5;
-/// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
-/// lie there.
-pub(super) const BORDER_PX: i64 = 2;
 
 /// Returns the distance from the strokes of the other image, in pixels of the half canvas, from which a pixel has no
 /// partner. `stroke_width` and `print_px`, the side of the pixels of a small print, are in the same pixels. Distances of
@@ -48,12 +46,16 @@ pub(super) struct Unmatched {
     pub(super) ink_area: f64,
     /// Displacement of whole strokes, see [`smooth_misfit`].
     pub(super) smooth_misfit: f64,
+    /// How surely the print has a whole stroke that was not carved, and the wood one that was not printed, 0..=1, see
+    /// [`lone_strokes`].
+    pub(super) lone_strokes: [f64; 2],
 }
 
 impl Unmatched {
     /// Measures the strokes without a partner. `levels` are the highest and the lowest threshold of all metrics: only
     /// wood above the highest one surely prints, and only ink outside the lowest one surely lies on no wood.
-    pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2]) -> Self {
+    /// `relief_levels` is the depth of the relief in levels.
+    pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2], relief_levels: f64) -> Self {
         let wood = InkEdge::of(&canvas.mask(lowest));
         let width = canvas.stroke_width;
         let tolerance = tolerance_px(width, canvas.print_px) as f32;
@@ -75,12 +77,19 @@ impl Unmatched {
         let ink = wood
             .grid()
             .zip_map(&canvas.ink, |distance, ink| is_far(&distance) && ink);
+        let alone = Alone {
+            ink: &ink,
+            tops: &tops,
+            wood: &wood,
+            levels: [highest, lowest],
+        };
         Self {
             tops: squares(&tops),
             ink: squares(&ink),
             edge_scatter: edge_scatter(canvas, &wood),
             ink_area: canvas.ink.count() as f64 / (width * width),
             smooth_misfit: smooth_misfit(canvas, &wood),
+            lone_strokes: lone_strokes(canvas, &alone, relief_levels),
         }
     }
 }
@@ -132,7 +141,7 @@ mod tests {
             Grid::from_fn(SIDE, SIDE, level),
             Mask::from_fn(SIDE, SIDE, |x, y| on_bar(ink, x, y + shift)),
         );
-        Unmatched::of(&canvas, [TOP, TOP])
+        Unmatched::of(&canvas, [TOP, TOP], f64::from(TOP))
     }
 
     #[test]
@@ -168,9 +177,9 @@ mod tests {
         };
         let ink = Mask::from_fn(SIDE, SIDE, |x, y| y < 20 && level(x, y) == TOP);
         let mut canvas = HalfCanvas::of(Grid::from_fn(SIDE, SIDE, level), ink);
-        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops > 5.0);
+        assert!(Unmatched::of(&canvas, [TOP, TOP], f64::from(TOP)).tops > 5.0);
         canvas.specks = Mask::from_fn(SIDE, SIDE, |x, y| x % 4 == 0 && y % 3 == 0);
-        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops < 0.2);
+        assert!(Unmatched::of(&canvas, [TOP, TOP], f64::from(TOP)).tops < 0.2);
     }
 
     #[test]

@@ -15,6 +15,8 @@ const NO_DOUBTS: Doubts = Doubts {
     share: 1.0,
     smooth_misfit: 0.0,
     seen_ink: 1.0,
+    lone_stroke: 0.0,
+    parts_overlap: 1.0,
 };
 
 const PLAIN: PoseFeatures = PoseFeatures {
