@@ -44,7 +44,7 @@ const BEYOND_PX: i64 = 3;
 
 /// A piece of ink without wood, or of tops without ink.
 #[derive(Debug, Default, Clone)]
-struct Piece {
+struct StrokePiece {
     /// Number of pixels at the border of the common area, and of the others.
     at_border: usize,
     inner: usize,
@@ -60,7 +60,7 @@ struct Piece {
 }
 
 /// Strokes of one of print and relief that are far from those of the other one.
-pub(super) struct Alone<'a> {
+pub(super) struct UnmatchedMasks<'a> {
     /// Ink far from the wood above the lowest level.
     pub(super) ink: &'a Mask,
     /// Tops above the highest level that are far from the ink.
@@ -73,11 +73,15 @@ pub(super) struct Alone<'a> {
 
 /// Returns how surely the print has a whole stroke that was not carved, and the wood one that was not printed, 0..=1.
 /// `relief_levels` is the depth of the relief in levels.
-pub(super) fn lone_strokes(canvas: &HalfCanvas, alone: &Alone, relief_levels: f64) -> [f64; 2] {
+pub(super) fn lone_strokes(
+    canvas: &HalfCanvas,
+    alone: &UnmatchedMasks,
+    relief_levels: f64,
+) -> [f64; 2] {
     let square = canvas.stroke_width.powi(2);
     let [tops, wood] = alone.levels.map(|level| canvas.mask(level));
-    let ink = Pieces::of(alone.ink, &canvas.ink, &wood, square);
-    let tops = Pieces::of(alone.tops, &tops, &canvas.ink, square);
+    let ink = StrokePieces::of(alone.ink, &canvas.ink, &wood, square);
+    let tops = StrokePieces::of(alone.tops, &tops, &canvas.ink, square);
     let areas =
         [&ink, &tops].map(|pieces| pieces.as_ref().map_or(0.0, |found| found.area / square));
     let of_ink = ink.and_then(|ink| of_ink(canvas, &ink, alone, areas[0], relief_levels));
@@ -90,8 +94,8 @@ pub(super) fn lone_strokes(canvas: &HalfCanvas, alone: &Alone, relief_levels: f6
 /// `None` if there is little ground beside the wood.
 fn of_ink(
     canvas: &HalfCanvas,
-    pieces: &Pieces,
-    alone: &Alone,
+    pieces: &StrokePieces,
+    alone: &UnmatchedMasks,
     area: f64,
     relief_levels: f64,
 ) -> Option<f64> {
@@ -128,7 +132,7 @@ fn of_ink(
 }
 
 /// Returns how surely a piece of tops is a whole stroke.
-fn of_tops(canvas: &HalfCanvas, pieces: &Pieces) -> f64 {
+fn of_tops(canvas: &HalfCanvas, pieces: &StrokePieces) -> f64 {
     let square = canvas.stroke_width.powi(2);
     let none =
         ConnectedComponents::label(&Mask::new(canvas.ink.width(), canvas.ink.height(), false));
@@ -137,7 +141,7 @@ fn of_tops(canvas: &HalfCanvas, pieces: &Pieces) -> f64 {
     scores.fold(0.0, f64::max)
 }
 
-impl Piece {
+impl StrokePiece {
     /// Returns how surely the piece is a whole stroke by its area and its edges. `square` is the square of the stroke width.
     fn whole(&self, square: f64) -> f64 {
         let free = self.free as f64 / self.beside.max(1) as f64;
@@ -162,7 +166,7 @@ fn ramp(value: f64, [from, to]: [f64; 2]) -> f64 {
 }
 
 /// Pieces of strokes without a partner that are connected with strokes that have one.
-struct Pieces {
+struct StrokePieces {
     components: ConnectedComponents,
     is_wanted: Vec<bool>,
     /// Number of their pixels.
@@ -171,7 +175,7 @@ struct Pieces {
     strokes: Mask,
 }
 
-impl Pieces {
+impl StrokePieces {
     /// Labels the pieces in `alone`, a part of `strokes`. `partners` are the strokes of the other image. Returns `None` if
     /// no piece is large enough and connected with enough matched strokes.
     fn of(alone: &Mask, strokes: &Mask, partners: &Mask, square: f64) -> Option<Self> {
@@ -223,10 +227,10 @@ impl Pieces {
         canvas: &HalfCanvas,
         beyond: &ConnectedComponents,
         rise: impl Fn(usize) -> f64,
-    ) -> Vec<Piece> {
+    ) -> Vec<StrokePiece> {
         let unknown = canvas.levels.map(|level| *level == 0);
         let width = unknown.width();
-        let mut measured = vec![Piece::default(); self.is_wanted.len()];
+        let mut measured = vec![StrokePiece::default(); self.is_wanted.len()];
         for at in (0..unknown.data().len()).filter(|at| !unknown.data()[*at]) {
             let (x, y) = ((at % width) as i64, (at / width) as i64);
             let Some(label) = self.at(x, y) else {
@@ -299,7 +303,7 @@ fn ground_levels(canvas: &HalfCanvas, wood: &InkEdge, lowest: u16) -> Option<Vec
 
 #[cfg(test)]
 mod tests {
-    use super::{Alone, lone_strokes};
+    use super::{UnmatchedMasks, lone_strokes};
     use crate::stages::register::half_canvas::HalfCanvas;
     use crate::stages::register::ink_edge::InkEdge;
     use mocban_core::raster::{Grid, Mask};
@@ -329,7 +333,7 @@ mod tests {
             from.grid()
                 .zip_map(mask, |distance, is_set| distance < -2.0 && is_set)
         };
-        let alone = Alone {
+        let alone = UnmatchedMasks {
             ink: &far(&wood, &canvas.ink),
             tops: &far(&canvas.edge, &strokes),
             wood: &wood,

@@ -5,7 +5,7 @@
 
 use super::half_canvas::{BORDER_PX, HalfCanvas};
 use super::ink_edge::{InkEdge, REACH};
-use super::lone_stroke::{Alone, lone_strokes};
+use super::lone_stroke::{UnmatchedMasks, lone_strokes};
 use super::misfit::smooth_misfit;
 use mocban_core::raster::Mask;
 use mocban_core::raster::components::ConnectedComponents;
@@ -77,7 +77,7 @@ impl Unmatched {
         let ink = wood
             .grid()
             .zip_map(&canvas.ink, |distance, ink| is_far(&distance) && ink);
-        let alone = Alone {
+        let alone = UnmatchedMasks {
             ink: &ink,
             tops: &tops,
             wood: &wood,
