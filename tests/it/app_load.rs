@@ -75,8 +75,8 @@ const CLIENTS: usize = 8;
 /// It was 7 MiB for 15,000 requests: later on, more large replies may be made at the same time than before.
 const GROWTH_MIB: u64 = 16;
 /// The same after the pages of a block were read three times. Memory that stays when a block is opened again adds 19 MiB to it
-/// in each trial.
-const BLOCK_GROWTH_MIB: u64 = 56;
+/// in each trial. On a busy machine, one opening may still be read while the next one begins, which adds 65 MiB once.
+const BLOCK_GROWTH_MIB: u64 = 90;
 
 /// Returns all paths. Those of imports and backups name files.
 fn paths(dir: &Path) -> Vec<String> {
@@ -181,7 +181,7 @@ fn the_memory_of_the_app_does_not_grow_when_a_block_is_opened_again() {
         peak_mib(page.pid())
     };
     let first = round(3);
-    let last = round(trials(4));
+    let last = round(trials(6));
     assert!(
         last <= first + BLOCK_GROWTH_MIB,
         "{first} MiB, then {last} MiB"
