@@ -17,7 +17,7 @@ const AREAS: [f64; 2] = [0.8, 1.6];
 /// Range of areas from which a piece no longer counts: it is a rule, a stain or a missing part of a print.
 const LARGE_AREAS: [f64; 2] = [6.0, 8.0];
 /// Range of the area of other strokes without a partner, in squares of the stroke width, from which a stroke is not the only
-/// difference: the print is torn, or the pose is wrong.
+/// difference: wood was lost, the print is torn, or the pose is wrong.
 const OTHERS: [f64; 2] = [1.0, 2.0];
 /// Range of the fraction of a piece's edge at which its stroke ends. It is 1 for a stroke that touches no other, and about a
 /// half for a loss within a stroke.
@@ -84,19 +84,17 @@ pub(super) fn lone_strokes(
     let tops = StrokePieces::of(alone.tops, &tops, &canvas.ink, square);
     let areas =
         [&ink, &tops].map(|pieces| pieces.as_ref().map_or(0.0, |found| found.area / square));
-    let of_ink = ink.and_then(|ink| of_ink(canvas, &ink, alone, areas[0], relief_levels));
+    let of_ink = ink.and_then(|ink| of_ink(canvas, &ink, alone, relief_levels));
     let of_tops = tops.map_or(0.0, |tops| of_tops(canvas, &tops));
     let is_only = areas.map(|others| 1.0 - ramp(others, OTHERS));
     [of_ink.unwrap_or(0.0) * is_only[1], of_tops * is_only[0]]
 }
 
-/// Returns how surely a piece of ink is a whole stroke. `area` is that of all pieces, in squares of the stroke width. Returns
-/// `None` if there is little ground beside the wood.
+/// Returns how surely a piece of ink is a whole stroke, or `None` if there is little ground beside the wood.
 fn of_ink(
     canvas: &HalfCanvas,
     pieces: &StrokePieces,
     alone: &UnmatchedMasks,
-    area: f64,
     relief_levels: f64,
 ) -> Option<f64> {
     let square = canvas.stroke_width.powi(2);
@@ -111,24 +109,38 @@ fn of_ink(
     let beyond = ConnectedComponents::label(&beyond_ink);
     let beyond_areas = beyond.parts_of(&beyond_ink);
     let measured = pieces.measured(canvas, &beyond, rise);
-    let scores = measured.into_iter().map(|piece| {
-        let remnants = piece.on_remnants as f64 / piece.inner.max(1) as f64;
-        let areas_beyond = piece.beyond.iter().map(|label| beyond_areas[*label].1);
-        let beyond = areas_beyond.sum::<usize>() as f64 / square;
-        let others = area - (piece.inner + piece.at_border) as f64 / square;
-        let within = piece.whole(square) * (1.0 - ramp(remnants, REMNANTS));
-        let leads_on = piece.at_border(square)
-            * ramp(beyond, BEYOND)
-            * (1.0 - ramp(remnants, REMNANTS_AT_BORDER))
-            * (1.0 - ramp(others, OTHERS));
-        let is_in_hole = -piece.rise / piece.inner.max(1) as f64 > HOLE;
-        if is_in_hole {
+    let remnants = |piece: &StrokePiece| piece.on_remnants as f64 / piece.inner.max(1) as f64;
+    let is_in_hole = |piece: &StrokePiece| -piece.rise / piece.inner.max(1) as f64 > HOLE;
+    let whole = |piece: &StrokePiece| {
+        let is_plain = f64::from(u8::from(!is_in_hole(piece)));
+        piece.whole(square) * (1.0 - ramp(remnants(piece), REMNANTS)) * is_plain
+    };
+    let leads_on = |piece: &StrokePiece| {
+        let areas = piece.beyond.iter().map(|label| beyond_areas[*label].1);
+        let is_plain = 1.0 - ramp(remnants(piece), REMNANTS_AT_BORDER);
+        let area_beyond = areas.sum::<usize>() as f64 / square;
+        if is_in_hole(piece) {
             0.0
         } else {
-            within.max(leads_on)
+            piece.at_border(square) * ramp(area_beyond, BEYOND) * is_plain
         }
-    });
-    Some(scores.fold(0.0, f64::max))
+    };
+    Some(surest(&measured, square, |piece| {
+        whole(piece).max(leads_on(piece))
+    }))
+}
+
+/// Returns the largest score of a piece. It is lower if the other pieces have a large area and low scores: these are losses.
+fn surest(pieces: &[StrokePiece], square: f64, score: impl Fn(&StrokePiece) -> f64) -> f64 {
+    let scores: Vec<f64> = pieces.iter().map(score).collect();
+    let losses = pieces.iter().zip(&scores);
+    let losses: Vec<f64> = losses
+        .map(|(piece, score)| (1.0 - score) * piece.area() / square)
+        .collect();
+    let all: f64 = losses.iter().sum();
+    let only = scores.iter().zip(losses);
+    only.map(|(score, own)| score * (1.0 - ramp(all - own, OTHERS)))
+        .fold(0.0, f64::max)
 }
 
 /// Returns how surely a piece of tops is a whole stroke.
@@ -137,15 +149,19 @@ fn of_tops(canvas: &HalfCanvas, pieces: &StrokePieces) -> f64 {
     let none =
         ConnectedComponents::label(&Mask::new(canvas.ink.width(), canvas.ink.height(), false));
     let measured = pieces.measured(canvas, &none, |_| 0.0);
-    let scores = measured.iter().map(|piece| piece.whole(square));
-    scores.fold(0.0, f64::max)
+    surest(&measured, square, |piece| piece.whole(square))
 }
 
 impl StrokePiece {
+    /// Returns the number of all pixels.
+    fn area(&self) -> f64 {
+        (self.inner + self.at_border) as f64
+    }
+
     /// Returns how surely the piece is a whole stroke by its area and its edges. `square` is the square of the stroke width.
     fn whole(&self, square: f64) -> f64 {
         let free = self.free as f64 / self.beside.max(1) as f64;
-        let area = (self.inner + self.at_border) as f64 / square;
+        let area = self.area() / square;
         ramp(self.inner as f64 / square, AREAS)
             * ramp(free, FREE_EDGES)
             * (1.0 - ramp(area, LARGE_AREAS))
