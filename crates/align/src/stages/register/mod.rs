@@ -39,6 +39,7 @@ pub use stroke_map::StrokeMap;
 use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use crate::stages::pose::SoftMask;
+use doubts::unexplained_misfit;
 use half_canvas::HalfCanvas;
 use larger_part::OtherPart;
 use metric_thresholds::ChosenThreshold;
@@ -178,10 +179,17 @@ pub fn register(
         .as_ref()
         .map(|part| canvas_print(&part.masks, search.ink));
     let print = part_print.as_ref().unwrap_or(&registered.canvas_print);
+    let of_posed = |posed: &Posed| {
+        unexplained_misfit(
+            posed.smooth_misfit,
+            posed.features.edge_scatter,
+            search.prior,
+        )
+    };
     let doubts = Doubts {
         share,
         // A levelling chooses the heights from the ink, which hides displaced strokes: the larger misfit counts.
-        smooth_misfit: posed.smooth_misfit.max(single.smooth_misfit),
+        smooth_misfit: of_posed(posed).max(of_posed(&single)),
         seen_ink: seen_ink(print, &posed.canvas.ink),
         lone_stroke: (of_part.as_ref())
             .map_or(0.0, |part| part.both.lone_stroke)
