@@ -25,7 +25,7 @@ use mocban_core::InputLimits;
 use mocban_core::domain::{BlockStage, BlockStageRecord};
 
 /// Version of each stage, in the order of the stages. A change of what a stage returns needs a new number.
-const REVISIONS: [u32; BlockStage::COUNT] = [2, 3, 5, 4];
+const REVISIONS: [u32; BlockStage::COUNT] = [2, 3, 6, 4];
 
 /// Computes the stages of blocks.
 #[derive(Debug)]
