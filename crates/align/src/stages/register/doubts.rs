@@ -10,7 +10,7 @@ const OTHER_BLOCK_DEVIATION: f64 = 0.0035;
 /// scatter beyond it. On two generated blocks with a vertex every 0.85 mm, 486 right pairs have a scatter of 0.1 to 0.24 and
 /// a displacement of 0.05 to 0.14; all but 3 of one block's 284 fall below [`OTHER_BLOCK`].
 const USUAL_SCATTER: f64 = 0.05;
-const EXPLAINED: f64 = 0.4;
+const EXPLAINED: f64 = 0.35;
 /// Fraction of the print's ink that must lie on the registered part and where the depth map has data.
 const LEAST_SEEN: f64 = 0.6;
 /// Factor of the confidence of a part with hardly any ink. It is 1 for a whole print.
