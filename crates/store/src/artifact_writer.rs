@@ -287,10 +287,10 @@ mod tests {
             let synced = std::sync::Mutex::new(Vec::new());
             let outcome = super::sync_each(&items, |item| {
                 synced.lock().expect("no panic").push(*item);
-                match failing == Some(*item) {
-                    true => Err(ArtifactError::Moved(item.to_string().into())),
-                    false => Ok(()),
+                if failing == Some(*item) {
+                    return Err(ArtifactError::Moved(item.to_string().into()));
                 }
+                Ok(())
             });
             assert_eq!(outcome.is_err(), failing.is_some());
             let mut synced = synced.into_inner().expect("no panic");

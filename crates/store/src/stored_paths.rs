@@ -1,5 +1,6 @@
 //! The form in which the paths of inputs are stored.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -17,7 +18,7 @@ pub struct StoredPaths<'p> {
     /// Absolute path of the project's directory.
     dir: PathBuf,
     /// The same after links are resolved, or `None` if it does not exist. Looked up when it is first needed.
-    resolved_dir: Option<Option<PathBuf>>,
+    resolved_dir: OnceCell<Option<PathBuf>>,
     /// Folders as they are written.
     folders: HashMap<PathBuf, InputFolder>,
 }
@@ -40,7 +41,7 @@ impl<'p> StoredPaths<'p> {
         Ok(Self {
             project,
             dir: plain_absolute(dir).map_err(StoreError::io(dir))?,
-            resolved_dir: None,
+            resolved_dir: OnceCell::new(),
             folders: HashMap::new(),
         })
     }
@@ -102,14 +103,13 @@ impl<'p> StoredPaths<'p> {
     }
 
     /// Returns an absolute path relative to the project. Links are resolved if its text is not below the project.
-    fn below_project(&mut self, absolute: &Path) -> Option<PathBuf> {
+    fn below_project(&self, absolute: &Path) -> Option<PathBuf> {
         if let Ok(below) = absolute.strip_prefix(&self.dir) {
             return Some(below.to_owned());
         }
-        let dir = &self.dir;
         let resolved_dir = self
             .resolved_dir
-            .get_or_insert_with(|| dir.canonicalize().ok());
+            .get_or_init(|| self.dir.canonicalize().ok());
         let resolved = absolute.canonicalize().ok()?;
         let below = resolved.strip_prefix(resolved_dir.as_ref()?).ok()?;
         Some(below.to_owned())

@@ -335,7 +335,7 @@ mod tests {
 
     /// Returns how surely one image of a block and a print has a stroke of its own.
     fn lone_stroke(level: impl Fn(usize, usize) -> u16, ink: impl Fn(usize, usize) -> bool) -> f64 {
-        let levels = Grid::from_fn(SIDE, SIDE, |x, y| level(x, y));
+        let levels = Grid::from_fn(SIDE, SIDE, level);
         let known = |x: usize, y: usize| levels.at(x, y) > 0;
         let mask =
             |wanted: bool| Mask::from_fn(SIDE, SIDE, |x, y| ink(x, y) && known(x, y) == wanted);

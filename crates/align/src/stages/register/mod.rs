@@ -179,17 +179,11 @@ pub fn register(
         .as_ref()
         .map(|part| canvas_print(&part.masks, search.ink));
     let print = part_print.as_ref().unwrap_or(&registered.canvas_print);
-    let of_posed = |posed: &Posed| {
-        unexplained_misfit(
-            posed.smooth_misfit,
-            posed.features.edge_scatter,
-            search.prior,
-        )
-    };
+    let misfits = [posed, &single].map(|posed| misfit_of(posed, search.prior));
     let doubts = Doubts {
         share,
         // A levelling chooses the heights from the ink, which hides displaced strokes: the larger misfit counts.
-        smooth_misfit: of_posed(posed).max(of_posed(&single)),
+        smooth_misfit: misfits[0].max(misfits[1]),
         seen_ink: seen_ink(print, &posed.canvas.ink),
         lone_stroke: (of_part.as_ref())
             .map_or(0.0, |part| part.both.lone_stroke)
@@ -215,6 +209,11 @@ pub fn register(
             .in_print(print, &refined.print_from_depth, part.share)
     });
     Ok(registered)
+}
+
+/// Returns the displacement of whole strokes that rough edges do not explain, as a fraction of the stroke width.
+fn misfit_of(posed: &Posed, prior: f64) -> f64 {
+    unexplained_misfit(posed.smooth_misfit, posed.features.edge_scatter, prior)
 }
 
 /// What was found on the larger part of a torn print.
