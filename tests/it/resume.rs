@@ -169,9 +169,10 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
             .output();
         let died = died.expect("the binary starts");
         assert_eq!(died.status.code(), None, "{point} was not reached");
-        // Each pair may have had a file that was being written.
+        // Each of six pairs may have had the files of a stage, at most ten, that were being written together.
         let least = usize::from(point.contains(":written"));
-        assert!((least..=6).contains(&temporary_files(&broken)), "{point}");
+        let left = temporary_files(&broken);
+        assert!((least..=60).contains(&left), "{point}: {left}");
     }
     call(&mut run(&broken, &[])).expect(0);
     assert_eq!(temporary_files(&broken), 0);
